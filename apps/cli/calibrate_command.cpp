@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdio>
+#include <memory>
+
+#include <revisit/io/calibration_file.hpp>
+#include <revisit/pipeline/calibrate_recording.hpp>
+
+#include "common.hpp"
+#include "progress.hpp"
+
+namespace revisit::cli {
+namespace {
+
+struct Options {
+  std::string input, out;
+  std::size_t scans = 100;
+  ParameterFlags parameters;
+};
+
+int calibrate(const Options& options) {
+  const auto parameters = options.parameters.resolve();
+  if (!parameters) return fail(parameters.error(), kUsage);
+  const auto recording = open_recording(options.input, print_log());
+  if (!recording) return fail(recording.error());
+  listen_for_interrupt();
+  Result<CalibrationReport> report = Error{};
+  {
+    std::optional<Progress> progress;
+    report = calibrate_recording(**recording, *parameters, options.scans, print_log(),
+                                 [&](std::size_t done, std::size_t total) {
+                                   if (!progress) progress.emplace("calibrate", "scans", total);
+                                   progress->update(done);
+                                   return !interrupted();
+                                 });
+  }
+  if (!report) return fail({options.input + ": " + report.error().message}, interrupted() ? kInterrupted : kFailed);
+  if (const Status status = write_calibration(options.out, report->calibration); !status) return fail(status.error());
+
+  const IntensityCalibration& phi = report->calibration;
+  std::printf("distance (m)  gain\n");
+  for (std::size_t i = 0; i < phi.distance_gains.size(); ++i)
+    std::printf("%12.0f  %.3f\n", phi.distance_knots_m[i], phi.distance_gains[i]);
+  if (!phi.ring_gains.empty()) {
+    const auto [least, most] = std::minmax_element(phi.ring_gains.begin(), phi.ring_gains.end());
+    std::printf("%zu rings, gains %.3f to %.3f\n", phi.ring_gains.size(), *least, *most);
+  }
+  std::printf(
+      "disagreement of %zu surface patches (half of them not learnt from): %.4f before, %.4f after (%.1f %% less)\n%s\n",
+      report->patches, report->disagreement_before, report->disagreement_after,
+      100.0 * (1.0 - report->disagreement_after / report->disagreement_before), options.out.c_str());
+  return kDone;
+}
+
+}  // namespace
+
+Run add_calibrate(CLI::App& program) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = program.add_subcommand(
+      "calibrate", "Learn from a recording how intensity falls with distance, and how rings differ.");
+  command->footer(
+      "The same small surface seen from different distances should read the same. What makes it so is written to\n"
+      "FILE, for `--calibration FILE` of detect and describe. The disagreement is measured on patches that were not\n"
+      "learnt from: 0 = a surface always reads the same, 1 = its reading says nothing.\n\n"
+      "Example: revisit calibrate kitti/sequences/00 --out hdl64.json");
+  command->add_option("recording", options->input, "Recording of a moving sensor")->required();
+  command->add_option("--out", options->out, "The calibration to write, .json")->required();
+  command->add_option("--scans", options->scans, "Learn from the first scans only")->capture_default_str()->check(CLI::Range(2, 200));
+  options->parameters.add_to(*command);
+  return [options] { return calibrate(*options); };
+}
+
+}  // namespace revisit::cli

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "common.hpp"
+
+#include <csignal>
+
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <revisit/config/parameter_file.hpp>
+#include <revisit/io/calibration_file.hpp>
+
+namespace revisit::cli {
+namespace {
+
+volatile std::sig_atomic_t interrupt_seen = 0;
+
+void on_interrupt(int signal) {
+  interrupt_seen = 1;
+  std::signal(signal, SIG_DFL);
+}
+
+spdlog::logger& logger() {
+  static const auto instance = [] {
+    auto log = spdlog::stderr_color_mt("revisit");
+    log->set_pattern("%^%l%$: %v");
+    return log;
+  }();
+  return *instance;
+}
+
+}  // namespace
+
+void ParameterFlags::add_to(CLI::App& command) {
+  std::string presets;
+  for (const auto& name : preset_names()) presets += (presets.empty() ? "" : ", ") + name;
+  command.add_option("--preset", preset_, "Parameters to start from: " + presets)->capture_default_str();
+  command.add_option("--parameters", file_, "TOML file of parameters, over the preset (`revisit parameters` prints one)");
+  for (const ParameterInfo& info : parameter_infos()) {
+    const std::string range = info.is_switch ? "true or false"
+                                             : CLI::detail::to_string(info.min) + " to " + CLI::detail::to_string(info.max);
+    command.add_option_function<std::string>(
+               "--" + info.name, [this, name = info.name](const std::string& value) { values_[name] = value; },
+               info.help + " [" + info.default_value + "; " + range + "]")
+        ->type_name("")
+        ->group("Parameters [default; allowed], over the file");
+  }
+}
+
+Result<Parameters> ParameterFlags::resolve() const {
+  auto parameters = preset(preset_);
+  if (parameters && !file_.empty()) parameters = read_parameters(file_, *parameters);
+  if (!parameters) return parameters;
+  for (const auto& [name, value] : values_)
+    if (const Status status = set_parameter(*parameters, name, value); !status)
+      return Error{"--" + name + ": " + status.error().message};
+  if (const Status status = validate(*parameters); !status) return status.error();
+  return parameters;
+}
+
+Result<IntensityCalibration> load_calibration(const std::string& file) {
+  if (file.empty()) return IntensityCalibration{};
+  return read_calibration(file);
+}
+
+LogSink print_log() {
+  return [](LogLevel level, const std::string& message) {
+    logger().log(level == LogLevel::kInfo      ? spdlog::level::info
+                 : level == LogLevel::kWarning ? spdlog::level::warn
+                                               : spdlog::level::err,
+                 message);
+  };
+}
+
+int fail(const Error& error, int code) {
+  logger().error(error.message);
+  return code;
+}
+
+void listen_for_interrupt() {
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGTERM, on_interrupt);
+}
+
+bool interrupted() { return interrupt_seen != 0; }
+
+}  // namespace revisit::cli

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include <revisit/config/parameters.hpp>
+#include <revisit/core/intensity_calibration.hpp>
+#include <revisit/core/log.hpp>
+#include <revisit/core/result.hpp>
+#include <revisit/io/recording.hpp>
+
+namespace revisit::cli {
+
+/// What the program returns to the shell; told in --help.
+enum ExitCode : int {
+  kDone = 0,
+  kFailed = 1,
+  kUsage = 2,
+  kDoneWithReservations = 3,  ///< finished, but scans were skipped or the intensity is of no use
+  kInterrupted = 130,
+};
+
+/// A sub-command registers its flags and, if chosen, is run through the returned function.
+using Run = std::function<int()>;
+Run add_detect(CLI::App& program);
+Run add_evaluate(CLI::App& program);
+Run add_describe(CLI::App& program);
+Run add_calibrate(CLI::App& program);
+Run add_info(CLI::App& program);
+Run add_parameters(CLI::App& program);
+
+/// The flags that choose parameters: --preset, --parameters FILE, and one flag a parameter, in this order of strength.
+class ParameterFlags {
+ public:
+  void add_to(CLI::App& command);
+  Result<Parameters> resolve() const;
+
+ private:
+  std::string preset_ = "default";
+  std::string file_;
+  std::map<std::string, std::string> values_;
+};
+
+/// The calibration in `file`, or the identity where no file was named.
+Result<IntensityCalibration> load_calibration(const std::string& file);
+
+/// Prints to standard error, with the level; the program's LogSink.
+LogSink print_log();
+/// Prints the error and what the shell is told.
+int fail(const Error& error, int code = kFailed);
+
+/// True from the first Ctrl-C on. The second one ends the program at once.
+void listen_for_interrupt();
+bool interrupted();
+
+}  // namespace revisit::cli

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <chrono>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include <revisit/io/pose_file.hpp>
+#include <revisit/io/result_files.hpp>
+#include <revisit/pipeline/loop_detector.hpp>
+
+#include "common.hpp"
+#include "progress.hpp"
+#include "run_file.hpp"
+
+namespace revisit::cli {
+namespace {
+
+struct Options {
+  std::string input, out, database, calibration;
+  bool overwrite = false;
+  ParameterFlags parameters;
+};
+
+void count(RunFile& run, const Detection& detection) {
+  run.counts["queries_with_past"] += detection.had_searchable_past;
+  run.counts["loops"] += detection.loop.has_value();
+  run.counts["registered"] += detection.geometric.has_value();
+  run.counts["points"] += detection.points;
+  run.counts["ground_points"] += detection.ground_points;
+  const auto& ms = detection.preparation_ms;
+  for (const auto& [stage, value] :
+       {std::pair{"filter", ms.filter}, {"ground", ms.ground}, {"intensity", ms.intensity}, {"describe", ms.describe},
+        {"thin", ms.thin}, {"search", detection.search_ms}, {"temporal", detection.temporal_ms},
+        {"geometric", detection.geometric_ms}})
+    run.ms_total[stage] += value;
+}
+
+// Scans that cannot be used are told, counted and left out; the rest goes on.
+void skip(RunFile& run, Progress& progress, const Error& error) {
+  progress.clear();
+  print_log()(LogLevel::kWarning, error.message + "; skipped");
+  run.skipped.push_back(error.message);
+}
+
+Status write_loop(ResultWriter& writer, const Detection& detection) {
+  if (detection.had_searchable_past)
+    if (const Status status = writer.add(detection.row()); !status) return status;
+  return detection.loop ? writer.add(LoopRow{*detection.loop, detection.score}) : ok();
+}
+
+// The places of another recording, to be found again.
+Status learn_database(LoopDetector& detector, const Recording& database, RunFile& run) {
+  Progress progress("learn", "scans", database.size());
+  for (std::size_t i = 0; i < database.size() && !interrupted(); ++i) {
+    auto scan = database.read(i);
+    const Status status = scan ? detector.add(*std::move(scan), database.trajectory().at(database.frame(i))) : scan.error();
+    if (!status) skip(run, progress, status.error());
+    progress.update(i + 1);
+  }
+  if (detector.index().size() == 0) return Error{run.database + ": no scan of the database can be used"};
+  run.counts["database_places"] = detector.index().size();
+  return ok();
+}
+
+Status detect_all(LoopDetector& detector, const Recording& recording, ResultWriter& writer, RunFile& run) {
+  Progress progress("detect", "scans", recording.size());
+  for (std::size_t i = 0; i < recording.size() && !interrupted(); ++i) {
+    Stopwatch watch;
+    auto scan = recording.read(i);
+    run.ms_total["read"] += watch.lap_ms();
+    auto detection = !scan                 ? Result<Detection>(scan.error())
+                     : run.database.empty() ? detector.process(*std::move(scan), recording.trajectory().at(recording.frame(i)))
+                                            : detector.localise(*std::move(scan));
+    if (!detection) {
+      skip(run, progress, detection.error());
+    } else {
+      ++run.counts["scans"];
+      count(run, *detection);
+      if (const Status status = write_loop(writer, *detection); !status) return status;
+    }
+    progress.update(i + 1);
+  }
+  run.interrupted = interrupted();
+  return ok();
+}
+
+Status write_poses(const std::filesystem::path& folder, const Recording& recording) {
+  if (recording.trajectory().empty()) return ok();
+  if (const Status status = write_kitti_poses(folder / "poses.txt", recording.trajectory(), recording.T_camera_lidar());
+      !status)
+    return status;
+  return write_tum_poses(folder / "poses.tum", recording.trajectory());
+}
+
+int detect(const Options& options) {
+  const auto parameters = options.parameters.resolve();
+  if (!parameters) return fail(parameters.error(), kUsage);
+  const auto calibration = load_calibration(options.calibration);
+  if (!calibration) return fail(calibration.error());
+  const auto recording = open_recording(options.input, print_log());
+  if (!recording) return fail(recording.error());
+  Result<std::unique_ptr<Recording>> database = std::unique_ptr<Recording>();
+  if (!options.database.empty()) database = open_recording(options.database, print_log());
+  if (!database) return fail(database.error());
+
+  RunFile run;
+  run.command = "detect";
+  run.input = options.input;
+  run.database = options.database;
+  run.parameters = *parameters;
+  const Recording& scale_source = *database ? **database : **recording;
+  const auto scale = estimate_intensity_scale(scale_source, *parameters);
+  if (!scale) return fail({scale.error().message + "; no scan can be used"});
+  run.intensity = *scale;
+  if (!scale->warning.empty()) print_log()(LogLevel::kWarning, scale->warning);
+
+  auto writer = ResultWriter::create(options.out, options.overwrite);
+  if (!writer) return fail(writer.error());
+  const std::filesystem::path out = options.out;
+  if (const Status status = write_poses(out, **recording); !status) return fail(status.error());
+
+  listen_for_interrupt();
+  LoopDetector detector(*parameters, *scale, *calibration, print_log());
+  if (*database)
+    if (const Status status = learn_database(detector, **database, run); !status) return fail(status.error());
+  Status status = detect_all(detector, **recording, *writer, run);
+  run.counts["skipped"] = run.skipped.size();
+  // run.json comes last and says how far the run came, whatever happened.
+  const Status finished = writer->finish();
+  const Status described = write_run(out / "run.json", run);
+  for (const Status* each : {&std::as_const(status), &finished, &described})
+    if (!*each) return fail(each->error());
+
+  std::cout << run.counts["scans"] << " scans, " << run.counts["loops"] << " loops, " << run.skipped.size()
+            << " scans skipped: " << options.out << "/loops.csv\n";
+  if (run.interrupted) return kInterrupted;
+  if (run.counts["scans"] == 0) return fail({options.input + ": no scan can be used"});
+  return run.skipped.empty() && scale->is_reflectance ? kDone : kDoneWithReservations;
+}
+
+}  // namespace
+
+Run add_detect(CLI::App& program) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = program.add_subcommand("detect", "Find the loop closures of a recording.");
+  command->footer(
+      "Writes into the folder of --out (formats: docs/formats.md):\n"
+      "  candidates.csv  one row a scan that had a searchable past: what it looked like, and why it was refused\n"
+      "  loops.csv       one row an accepted loop, with its 6-DoF pose T_match_query\n"
+      "  poses.txt/.tum  the poses that came with the recording, if any\n"
+      "  run.json        version, parameters, counts, milliseconds a stage\n\n"
+      "Example: revisit detect kitti/sequences/00 --out results/00");
+  command->add_option("input", options->input, "Recording: KITTI folder, KITTI raw drive, or folder of scans")->required();
+  command->add_option("--out", options->out, "Folder for the results")->required();
+  command->add_option("--database", options->database,
+                      "Look for the scans of the recording in this other one (a map) instead of in its own past");
+  command->add_option("--calibration", options->calibration, "Intensity calibration made by `revisit calibrate`");
+  command->add_flag("--overwrite", options->overwrite, "Replace results that are already in the folder");
+  options->parameters.add_to(*command);
+  return [options] { return detect(*options); };
+}
+
+}  // namespace revisit::cli

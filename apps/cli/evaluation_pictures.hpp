@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+#include <revisit/core/result.hpp>
+
+#include <revisit/evaluation/loop_table.hpp>
+#include <revisit/evaluation/retrieval_table.hpp>
+
+namespace revisit::cli {
+
+Status draw_precision_recall(const std::filesystem::path& file, const RetrievalTable& all, const RetrievalTable& reverse);
+
+/// The reference trajectory from above, light to dark as time goes, revisits thickened, right loops red and false ones
+/// crossed in black with a line to their match.
+Status draw_trajectory(const std::filesystem::path& file, const Reference& reference, const LoopTable& loops);
+
+}  // namespace revisit::cli

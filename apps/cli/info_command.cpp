@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdio>
+#include <memory>
+#include <vector>
+
+#include <revisit/io/scan_file.hpp>
+#include <revisit/pipeline/prepare.hpp>
+#include <revisit/preprocess/rings.hpp>
+
+#include "common.hpp"
+#include "sensor_guess.hpp"
+
+namespace revisit::cli {
+namespace {
+
+void print_scan_facts(const Scan& scan, const IntensityScale& scale) {
+  const Rings rings = find_rings(scan);
+  const SensorGuess sensor = guess_sensor(scan, rings);
+  float farthest_m = 0.f;
+  for (const Point& p : scan.points) farthest_m = std::max(farthest_m, std::sqrt(p.x * p.x + p.y * p.y + p.z * p.z));
+  std::printf("points       %zu usable; dropped: %zu not finite, %zu at (0,0,0)\n", scan.points.size(),
+              scan.dropped_non_finite, scan.dropped_at_origin);
+  std::printf("sensor       %s\n", sensor.name.c_str());
+  if (rings.source == RingSource::kNone)
+    std::printf("rings        none found\n");
+  else
+    std::printf("rings        %zu, %s\n", rings.count(), to_string(rings.source).c_str());
+  std::printf("view         %.0f degrees around, %.1f to %.1f degrees up, up to %.1f m\n", sensor.horizontal_deg,
+              sensor.lowest_deg, sensor.highest_deg, static_cast<double>(farthest_m));
+  std::printf("point times  %s\n", scan.times_s.empty() ? "none" : "yes, within the sweep");
+  std::printf("intensity    %.6g to %.6g, median of the positive ones %.6g; %.6g becomes 1\n", scale.min_raw,
+              scale.max_raw, scale.median_raw, scale.full_scale);
+  if (!scale.warning.empty()) print_log()(LogLevel::kWarning, scale.warning);
+}
+
+int info_of_file(const std::string& file, const Parameters& parameters) {
+  const auto scan = read_scan(file, print_log());
+  if (!scan) return fail(scan.error());
+  std::printf("file         %s\n", file.c_str());
+  const IntensityScale scale = estimate_intensity_scale(std::span<const Scan>(&*scan, 1), parameters.intensity);
+  print_scan_facts(*scan, scale);
+  return scale.is_reflectance ? kDone : kDoneWithReservations;
+}
+
+int info_of_recording(const std::string& folder, const Parameters& parameters) {
+  const auto opened = open_recording(folder, print_log());
+  if (!opened) return fail(opened.error());
+  const Recording& recording = **opened;
+  const std::size_t last = recording.size() - 1;
+  std::printf("recording    %s (%s)\n", folder.c_str(), recording.kind().c_str());
+  std::printf("scans        %zu, frames %lld to %lld\n", recording.size(), static_cast<long long>(recording.frame(0).value),
+              static_cast<long long>(recording.frame(last).value));
+  const double span_s = recording.stamp_s(last) - recording.stamp_s(0);
+  const auto frames = static_cast<double>(recording.frame(last).value - recording.frame(0).value);
+  if (!recording.has_times())
+    std::printf("rate         unknown: no times; 0.1 s a frame is assumed\n");
+  else if (span_s > 0.0)
+    std::printf("rate         %.2f Hz, %.1f s long\n", frames / span_s, span_s);
+  std::printf("poses        %zu\n", recording.trajectory().entries.size());
+
+  std::size_t broken = 0;
+  std::optional<Scan> first;
+  for (std::size_t i = 0; i < recording.size() && !first; ++i) {
+    auto scan = recording.read(i);
+    if (scan) {
+      first = *std::move(scan);
+    } else {
+      ++broken;
+      print_log()(LogLevel::kWarning, scan.error().message);
+    }
+  }
+  if (!first) return fail({folder + ": no scan can be read"});
+  std::printf("first scan   frame %lld\n", static_cast<long long>(first->frame.value));
+  const auto scale = estimate_intensity_scale(recording, parameters);
+  if (!scale) return fail(scale.error());
+  print_scan_facts(*first, *scale);
+  return broken == 0 && scale->is_reflectance ? kDone : kDoneWithReservations;
+}
+
+}  // namespace
+
+Run add_info(CLI::App& program) {
+  struct Options {
+    std::string input;
+    ParameterFlags parameters;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* command = program.add_subcommand(
+      "info", "Tell what a recording or a single scan file holds: sensor, rings, rate, intensity, poses.");
+  command->footer("Example: revisit info kitti/sequences/00; revisit info cloud.pcd");
+  command->add_option("input", options->input, "Recording or scan file")->required();
+  options->parameters.add_to(*command);
+  return [options]() -> int {
+    const auto parameters = options->parameters.resolve();
+    if (!parameters) return fail(parameters.error(), kUsage);
+    return std::filesystem::is_directory(options->input) ? info_of_recording(options->input, *parameters)
+                                                         : info_of_file(options->input, *parameters);
+  };
+}
+
+}  // namespace revisit::cli

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "report.hpp"
+
+#include <cstdio>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+namespace revisit::cli {
+namespace {
+
+template <typename... Values>
+std::string format(const char* pattern, Values... values) {
+  char text[256];
+  std::snprintf(text, sizeof text, pattern, values...);
+  return text;
+}
+
+std::string escape(const std::string& text) {
+  std::string safe;
+  for (const char c : text) safe += c == '<' ? "&lt;" : c == '&' ? "&amp;" : std::string(1, c);
+  return safe;
+}
+
+// Rows of a table as cells, so that text and HTML show the same numbers. Without revisits there is no recall.
+using Table = std::vector<std::vector<std::string>>;
+
+Table table_1(const EvaluationReport& report) {
+  Table table = {{"", "revisits", "answers", "R@1", "F1max", "AP", "R@P100", "EP"}};
+  const auto add = [&](const char* name, const RetrievalTable& t) {
+    const auto figure = [&](double value) { return t.revisits == 0 ? std::string("-") : format("%.3f", value); };
+    table.push_back({name, std::to_string(t.revisits), std::to_string(t.answers), figure(t.recall_at_1),
+                     figure(t.f1_max), figure(t.average_precision), figure(t.recall_at_p100),
+                     figure(t.extended_precision)});
+  };
+  add("all", report.retrieval);
+  add("reverse", report.reverse_retrieval);
+  return table;
+}
+
+Table table_2(const EvaluationReport& report) {
+  const LoopTable& t = report.loops;
+  const auto recall = [](double value, std::size_t of) { return of == 0 ? std::string("-") : format("%.3f", value); };
+  const auto error = [&](double value, const char* unit) {
+    return t.accepted == 0 ? std::string("-") : format("%.3f %s", value, unit);
+  };
+  return {{"accepted", "false loops", "precision", "recall", "reverse recall", "translation median", "95 %",
+           "rotation median", "95 %"},
+          {std::to_string(t.accepted), std::to_string(t.false_loops),
+           t.accepted == 0 ? "-" : format("%.3f", t.precision), recall(t.recall, t.revisits),
+           recall(t.reverse_recall, t.reverse_revisits), error(t.median_translation_m, "m"),
+           error(t.p95_translation_m, "m"), error(t.median_rotation_deg, "deg"), error(t.p95_rotation_deg, "deg")}};
+}
+
+std::string to_text(const Table& table) {
+  std::string text;
+  for (const auto& row : table) {
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      std::size_t width = 0;
+      for (const auto& each : table) width = std::max(width, each[i].size());
+      text += std::string(width - row[i].size() + 2, ' ') + row[i];
+    }
+    text += '\n';
+  }
+  return text;
+}
+
+std::string to_html(const Table& table) {
+  std::string html = "<table>\n";
+  for (std::size_t r = 0; r < table.size(); ++r) {
+    html += "<tr>";
+    for (const auto& cell : table[r]) html += (r == 0 ? "<th>" : "<td>") + escape(cell) + (r == 0 ? "</th>" : "</td>");
+    html += "</tr>\n";
+  }
+  return html + "</table>\n";
+}
+
+std::string rules_text(const EvaluationReport& report) {
+  const EvaluationRules& rules = report.rules;
+  std::string text = format(
+      "Frames at least %d frames and %.1f s older may be matched; the same place is within %.1f m; a loop is right "
+      "within %.1f m and %.1f degrees.",
+      rules.exclude_frames, rules.exclude_s, rules.same_place_m, rules.right_translation_m, rules.right_rotation_deg);
+  if (report.loops.without_reference > 0)
+    text += format(" %zu accepted loops have no reference pose and are not judged.", report.loops.without_reference);
+  return text;
+}
+
+}  // namespace
+
+std::string to_text(const EvaluationReport& report) {
+  return "Table 1, retrieval (top-1, score swept)\n" + to_text(table_1(report)) +
+         "\nTable 2, loop constraints (as accepted)\n" + to_text(table_2(report)) + "\n" + rules_text(report) + "\n";
+}
+
+std::string to_json(const EvaluationReport& report) {
+  const auto retrieval = [](const RetrievalTable& t) {
+    return nlohmann::ordered_json{{"revisits", t.revisits},       {"answers", t.answers},
+                                  {"right", t.right},             {"recall_at_1", t.recall_at_1},
+                                  {"f1_max", t.f1_max},           {"average_precision", t.average_precision},
+                                  {"recall_at_p100", t.recall_at_p100},
+                                  {"extended_precision", t.extended_precision}};
+  };
+  const LoopTable& l = report.loops;
+  const nlohmann::ordered_json document = {
+      {"results", report.results},
+      {"reference", report.reference},
+      {"rules",
+       {{"exclude_frames", report.rules.exclude_frames},
+        {"exclude_s", report.rules.exclude_s},
+        {"same_place_m", report.rules.same_place_m},
+        {"right_translation_m", report.rules.right_translation_m},
+        {"right_rotation_deg", report.rules.right_rotation_deg}}},
+      {"table_1", {{"all", retrieval(report.retrieval)}, {"reverse", retrieval(report.reverse_retrieval)}}},
+      {"table_2",
+       {{"accepted", l.accepted},
+        {"false_loops", l.false_loops},
+        {"without_reference", l.without_reference},
+        {"precision", l.precision},
+        {"recall", l.recall},
+        {"reverse_recall", l.reverse_recall},
+        {"median_translation_m", l.median_translation_m},
+        {"p95_translation_m", l.p95_translation_m},
+        {"median_rotation_deg", l.median_rotation_deg},
+        {"p95_rotation_deg", l.p95_rotation_deg}}}};
+  return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+std::string to_html(const EvaluationReport& report) {
+  return "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>revisit: loop closures</title>\n"
+         "<style>body{font-family:sans-serif;max-width:1000px;margin:2em auto}table{border-collapse:collapse}"
+         "th,td{border:1px solid #bbb;padding:.3em .7em;text-align:right}img{max-width:100%}</style>\n"
+         "<h1>Loop closures</h1>\n<p>Results: " +
+         escape(report.results) + "<br>Reference: " + escape(report.reference) + "</p>\n<p>" + rules_text(report) +
+         "</p>\n<h2>Table 1, retrieval</h2>\n" + to_html(table_1(report)) + "<h2>Table 2, loop constraints</h2>\n" +
+         to_html(table_2(report)) +
+         "<h2>Trajectory and loops</h2>\n<img src=\"trajectory.png\" alt=\"trajectory with loops\">\n"
+         "<h2>Precision and recall</h2>\n<img src=\"precision_recall.png\" alt=\"precision over recall\">\n</html>\n";
+}
+
+}  // namespace revisit::cli

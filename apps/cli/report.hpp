@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include <revisit/evaluation/loop_table.hpp>
+#include <revisit/evaluation/retrieval_table.hpp>
+
+namespace revisit::cli {
+
+/// What `evaluate` found: tables 1 and 2 of docs/evaluation.md.
+struct EvaluationReport {
+  std::string results, reference;
+  EvaluationRules rules;
+  RetrievalTable retrieval, reverse_retrieval;
+  LoopTable loops;
+};
+
+std::string to_text(const EvaluationReport& report);
+std::string to_json(const EvaluationReport& report);
+/// A page that shows the tables and the two pictures beside it.
+std::string to_html(const EvaluationReport& report);
+
+}  // namespace revisit::cli

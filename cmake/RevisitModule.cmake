@@ -1,0 +1,43 @@
+# revisit_module(NAME SOURCES ... PUBLIC ... PRIVATE ... TESTS ...)
+# One folder of src/revisit as the target revisit_NAME; TESTS stand beside their sources and
+# become the test program NAME_test, skipped as a whole where REVISIT_BUILD_TESTS is off.
+function(revisit_module name)
+  cmake_parse_arguments(M "" "" "SOURCES;PUBLIC;PRIVATE;TESTS" ${ARGN})
+  set(target revisit_${name})
+  if(M_SOURCES)
+    add_library(${target} STATIC ${M_SOURCES})
+    set(scope PUBLIC)
+    target_link_libraries(${target} PRIVATE ${M_PRIVATE} $<BUILD_INTERFACE:revisit_flags>)
+  else()
+    add_library(${target} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  add_library(revisit::${name} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+  target_compile_features(${target} ${scope} cxx_std_20)
+  target_include_directories(${target} ${scope}
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_link_libraries(${target} ${scope} ${M_PUBLIC})
+  set_property(GLOBAL APPEND PROPERTY REVISIT_MODULES ${target})
+  if(M_TESTS AND REVISIT_BUILD_TESTS)
+    revisit_test(${name}_test SOURCES ${M_TESTS} LIBRARIES ${target})
+  endif()
+endfunction()
+
+# revisit_test(NAME SOURCES ... LIBRARIES ...): one GoogleTest program, each test known to CTest.
+function(revisit_test name)
+  cmake_parse_arguments(T "" "" "SOURCES;LIBRARIES" ${ARGN})
+  add_executable(${name} ${T_SOURCES})
+  target_link_libraries(${name} PRIVATE ${T_LIBRARIES} revisit_flags GTest::gtest GTest::gtest_main)
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
+  target_compile_definitions(${name} PRIVATE REVISIT_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT 120)
+endfunction()
+
+add_library(revisit_flags INTERFACE)
+target_compile_options(revisit_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
+  -Wno-restrict)  # GCC 12 warns of its own std::string
+if(REVISIT_SANITIZE)
+  add_compile_options(-fsanitize=${REVISIT_SANITIZE} -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${REVISIT_SANITIZE})
+endif()

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/config/parameter_file.hpp>
+
+#include <sstream>
+
+#include <toml++/toml.h>
+
+namespace revisit {
+namespace {
+
+std::string place(const std::filesystem::path& file, const toml::node& node) {
+  return file.string() + ":" + std::to_string(node.source().begin.line) + ": ";
+}
+
+std::string as_text(const toml::node& value) {
+  std::ostringstream text;
+  value.visit([&](const auto& concrete) { text << concrete; });
+  return text.str();
+}
+
+}  // namespace
+
+Result<Parameters> read_parameters(const std::filesystem::path& file, Parameters base) {
+  toml::table document;
+  try {
+    document = toml::parse_file(file.string());
+  } catch (const toml::parse_error& problem) {
+    return Error{file.string() + ":" + std::to_string(problem.source().begin.line) + ": " +
+                 std::string(problem.description())};
+  }
+  for (const auto& [section, body] : document) {
+    const toml::table* fields = body.as_table();
+    if (fields == nullptr)
+      return Error{place(file, body) + "'" + std::string(section.str()) + "' stands outside a [section]"};
+    for (const auto& [field, value] : *fields) {
+      const std::string name = std::string(section.str()) + "." + std::string(field.str());
+      if (const Status status = set_parameter(base, name, as_text(value)); !status)
+        return Error{place(file, value) + status.error().message};
+    }
+  }
+  if (const Status status = validate(base); !status) return Error{file.string() + ": " + status.error().message};
+  return base;
+}
+
+}  // namespace revisit

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/config/parameters.hpp>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <functional>
+#include <numeric>
+#include <stdexcept>
+#include <variant>
+
+namespace revisit {
+namespace {
+
+using Field = std::variant<std::function<double&(Parameters&)>, std::function<int&(Parameters&)>,
+                           std::function<bool&(Parameters&)>>;
+
+struct Entry {
+  std::string name;
+  Field field;
+  double min, max;
+  std::string help;
+};
+
+#define REVISIT_FIELD(type, section, field) \
+  std::function<type&(Parameters&)>([](Parameters& p) -> type& { return p.section.field; })
+#define REVISIT_REAL(section, field, min, max, help) \
+  Entry { #section "." #field, REVISIT_FIELD(double, section, field), min, max, help }
+#define REVISIT_INTEGER(section, field, min, max, help) \
+  Entry { #section "." #field, REVISIT_FIELD(int, section, field), min, max, help }
+#define REVISIT_SWITCH(section, field, help) \
+  Entry { #section "." #field, REVISIT_FIELD(bool, section, field), 0, 0, help }
+
+// The one table from which flags, file format, validation and reference page are made.
+const std::vector<Entry>& table() {
+  static const std::vector<Entry> entries = {
+      REVISIT_REAL(preprocess, min_range_m, 0, 20, "nearer returns are dropped: they are the vehicle itself"),
+      REVISIT_REAL(preprocess, max_range_m, 5, 500, "farther returns are dropped: noise grows with distance"),
+      REVISIT_SWITCH(preprocess, remove_ground, "describe the scan without its ground"),
+      REVISIT_REAL(preprocess, ground_slope_deg, 1, 45,
+                   "steepest slope between two vertically neighbouring returns that is still ground"),
+      REVISIT_INTEGER(preprocess, ground_min_segment_points, 1, 100000,
+                      "flat patches of fewer points (car roofs) are not ground"),
+      REVISIT_REAL(intensity, full_scale, 0, 1e9, "raw intensity that becomes 1; 0 finds it from the recording"),
+      REVISIT_REAL(intensity, full_scale_quantile, 0.5, 1,
+                   "share of the readings at or below full scale, where it is found from the recording"),
+      REVISIT_INTEGER(descriptor, rings, 1, 512, "N_r, radial bins of the polar grid"),
+      REVISIT_INTEGER(descriptor, sectors, 1, 720, "N_s, azimuthal bins of the polar grid"),
+      REVISIT_REAL(descriptor, max_range_m, 1, 500, "L_max, outer radius of the polar grid"),
+      REVISIT_INTEGER(descriptor, min_occupied_cells, 1, 100000, "a scan with fewer occupied cells describes no place"),
+      REVISIT_INTEGER(retrieval, top_k, 1, 1000, "candidates returned for a query, best first"),
+      REVISIT_INTEGER(retrieval, shortlist, 0, 10000000,
+                      "places of best geometry score that enter the intensity stage; 0 lets all in"),
+      REVISIT_REAL(retrieval, min_geometry_score, 0, 1, "epsilon_g, least geometry score of a candidate"),
+      REVISIT_REAL(retrieval, min_intensity_score, 0, 1, "epsilon_i, least intensity score of a candidate"),
+      REVISIT_INTEGER(retrieval, exclude_frames, 1, 10000000, "places fewer frames before the query are not searched"),
+      REVISIT_REAL(retrieval, exclude_s, 0, 1e9, "places fewer seconds before the query are not searched"),
+      REVISIT_INTEGER(temporal, frames, 1, 1000, "N, preceding pairs of frames that are averaged"),
+      REVISIT_REAL(temporal, min_score, 0, 2, "xi, least mean of geometry plus intensity score; 0 never refuses"),
+      REVISIT_REAL(geometric, voxel_m, 0.05, 5, "edge of the voxels that thin a scan before registration"),
+      REVISIT_INTEGER(geometric, candidates, 1, 1000, "how many of the top-K candidates are registered, best first"),
+      REVISIT_REAL(geometric, min_descriptor_score, 0, 2,
+                   "candidates of lower geometry plus intensity score are not registered"),
+      REVISIT_REAL(geometric, feature_radius_m, 0.1, 50, "neighbourhood of an FPFH feature"),
+      REVISIT_REAL(geometric, inlier_distance_m, 0.01, 5, "farthest point-to-plane distance of an inlier"),
+      REVISIT_REAL(geometric, min_inlier_ratio, 0, 1,
+                   "share of the points above ground, in both directions, that must be inliers"),
+      REVISIT_REAL(geometric, max_translation_m, 0.1, 1000, "a longer relative translation is refused"),
+  };
+  return entries;
+}
+
+#undef REVISIT_SWITCH
+#undef REVISIT_INTEGER
+#undef REVISIT_REAL
+#undef REVISIT_FIELD
+
+std::string to_text(double value) {
+  char buffer[32];
+  const auto end = std::to_chars(buffer, buffer + sizeof buffer, value).ptr;
+  return {buffer, end};
+}
+
+std::string value_text(const Entry& entry, Parameters& parameters) {
+  return std::visit(
+      [&](const auto& get) -> std::string {
+        const auto value = get(parameters);
+        if constexpr (std::is_same_v<decltype(value), const bool>)
+          return value ? "true" : "false";
+        else
+          return to_text(static_cast<double>(value));
+      },
+      entry.field);
+}
+
+std::string range_text(const Entry& entry) { return to_text(entry.min) + " to " + to_text(entry.max); }
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0]++;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i] != b[j]);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+Error unknown_name(std::string_view name) {
+  const auto& nearest = *std::min_element(table().begin(), table().end(), [&](const Entry& a, const Entry& b) {
+    return edit_distance(name, a.name) < edit_distance(name, b.name);
+  });
+  return {"unknown parameter '" + std::string(name) + "'; did you mean '" + nearest.name + "'?"};
+}
+
+const Entry* find(std::string_view name) {
+  const auto& entries = table();
+  const auto found = std::find_if(entries.begin(), entries.end(), [&](const Entry& e) { return e.name == name; });
+  return found == entries.end() ? nullptr : &*found;
+}
+
+}  // namespace
+
+std::vector<ParameterInfo> parameter_infos() {
+  Parameters defaults;
+  std::vector<ParameterInfo> infos;
+  for (const Entry& entry : table())
+    infos.push_back({entry.name, entry.help, value_text(entry, defaults), entry.min, entry.max,
+                     std::holds_alternative<std::function<bool&(Parameters&)>>(entry.field),
+                     std::holds_alternative<std::function<int&(Parameters&)>>(entry.field)});
+  return infos;
+}
+
+std::vector<std::string> preset_names() { return {"default", "paper", "grid20x60", "grid60x20"}; }
+
+Result<Parameters> preset(std::string_view name) {
+  Parameters p;
+  if (name == "default") return p;
+  if (name == "grid20x60" || name == "grid60x20") {
+    p.descriptor.rings = name == "grid20x60" ? 20 : 60;
+    p.descriptor.sectors = name == "grid20x60" ? 60 : 20;
+    return p;
+  }
+  if (name == "paper") {  // table I of the paper, to the letter
+    p.preprocess.max_range_m = p.descriptor.max_range_m = 50.0;
+    p.preprocess.remove_ground = true;
+    p.descriptor.sectors = 20;
+    p.descriptor.rings = 60;
+    p.retrieval.shortlist = 0;
+    p.retrieval.min_geometry_score = 0.9;
+    p.retrieval.min_intensity_score = 0.92;
+    p.temporal.frames = 5;
+    p.temporal.min_score = 1.8;
+    p.geometric.min_descriptor_score = 0.0;
+    return p;
+  }
+  std::string known;
+  for (const auto& each : preset_names()) known += (known.empty() ? "" : ", ") + each;
+  return Error{"unknown preset '" + std::string(name) + "'; known: " + known};
+}
+
+Status set_parameter(Parameters& parameters, std::string_view name, std::string_view value) {
+  const Entry* entry = find(name);
+  if (entry == nullptr) return unknown_name(name);
+  const auto refuse = [&](const std::string& allowed) {
+    return Error{entry->name + " = " + std::string(value) + " is not allowed; allowed: " + allowed};
+  };
+  if (const auto* get = std::get_if<std::function<bool&(Parameters&)>>(&entry->field)) {
+    if (value != "true" && value != "false") return refuse("true or false");
+    (*get)(parameters) = value == "true";
+    return ok();
+  }
+  double number = 0.0;
+  const auto [end, failure] = std::from_chars(value.data(), value.data() + value.size(), number);
+  const bool parsed = failure == std::errc() && end == value.data() + value.size() && std::isfinite(number);
+  const bool in_range = parsed && number >= entry->min && number <= entry->max;
+  if (const auto* get = std::get_if<std::function<int&(Parameters&)>>(&entry->field)) {
+    if (!in_range || number != std::floor(number)) return refuse("a whole number, " + range_text(*entry));
+    (*get)(parameters) = static_cast<int>(number);
+    return ok();
+  }
+  if (!in_range) return refuse(range_text(*entry));
+  std::get<std::function<double&(Parameters&)>>(entry->field)(parameters) = number;
+  return ok();
+}
+
+std::string get_parameter(const Parameters& parameters, std::string_view name) {
+  const Entry* entry = find(name);
+  if (entry == nullptr) throw std::invalid_argument(unknown_name(name).message);
+  Parameters copy = parameters;
+  return value_text(*entry, copy);
+}
+
+Status validate(const Parameters& parameters) {
+  Parameters copy = parameters;
+  for (const Entry& entry : table()) {
+    const Status status = set_parameter(copy, entry.name, get_parameter(parameters, entry.name));
+    if (!status) return status;
+  }
+  if (parameters.preprocess.min_range_m >= parameters.preprocess.max_range_m)
+    return Error{"preprocess.min_range_m = " + to_text(parameters.preprocess.min_range_m) +
+                 " is not allowed; allowed: less than preprocess.max_range_m = " +
+                 to_text(parameters.preprocess.max_range_m)};
+  return ok();
+}
+
+}  // namespace revisit

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <revisit/core/intensity_calibration.hpp>
+#include <revisit/core/log.hpp>
+#include <revisit/core/loop.hpp>
+#include <revisit/core/result.hpp>
+#include <revisit/core/scan.hpp>
+
+namespace revisit {
+namespace {
+
+TEST(Result, HoldsEitherValueOrError) {
+  const Result<int> good = 7;
+  const Result<int> bad = Error{"file x: 3 is not allowed"};
+  ASSERT_TRUE(good);
+  EXPECT_EQ(*good, 7);
+  ASSERT_FALSE(bad);
+  EXPECT_EQ(bad.error().message, "file x: 3 is not allowed");
+}
+
+TEST(WrapAngle, StaysInHalfOpenTurn) {
+  EXPECT_NEAR(wrap_angle(3 * kPi), -kPi, 1e-12);
+  EXPECT_NEAR(wrap_angle(-kPi), -kPi, 1e-12);
+  EXPECT_NEAR(wrap_angle(0.25 - 4 * kPi), 0.25, 1e-12);
+  EXPECT_NEAR(to_degrees(to_radians(33.0)), 33.0, 1e-12);
+}
+
+TEST(KeepPoints, KeepsRingsAndTimesWithTheirPoints) {
+  Scan scan;
+  for (int i = 0; i < 5; ++i) {
+    scan.points.push_back({static_cast<float>(i), 0.f, 0.f, 0.f});
+    scan.rings.push_back(static_cast<std::uint16_t>(10 + i));
+    scan.times_s.push_back(0.5f * static_cast<float>(i));
+  }
+  keep_points(scan, [](std::size_t i) { return i % 2 == 1; });
+  ASSERT_EQ(scan.points.size(), 2u);
+  EXPECT_EQ(scan.points[1].x, 3.f);
+  EXPECT_EQ(scan.rings, (std::vector<std::uint16_t>{11, 13}));
+  EXPECT_EQ(scan.times_s, (std::vector<float>{0.5f, 1.5f}));
+}
+
+TEST(IntensityCalibration, InterpolatesAndHoldsAtTheEnds) {
+  const IntensityCalibration identity;
+  EXPECT_TRUE(identity.is_identity());
+  EXPECT_EQ(identity.distance_gain(12.0) * identity.ring_gain(3), 1.0);
+  const IntensityCalibration table{{10.0, 20.0}, {1.0, 3.0}, {0.5}};
+  EXPECT_DOUBLE_EQ(table.distance_gain(5.0), 1.0);
+  EXPECT_DOUBLE_EQ(table.distance_gain(15.0), 2.0);
+  EXPECT_DOUBLE_EQ(table.distance_gain(99.0), 3.0);
+  EXPECT_DOUBLE_EQ(table.ring_gain(0), 0.5);
+  EXPECT_DOUBLE_EQ(table.ring_gain(7), 1.0);
+}
+
+TEST(LogSink, SilentWithoutASink) {
+  log_to({}, LogLevel::kWarning, "nobody listens");
+  std::string heard;
+  log_to([&](LogLevel, const std::string& message) { heard = message; }, LogLevel::kWarning, "hello");
+  EXPECT_EQ(heard, "hello");
+}
+
+}  // namespace
+}  // namespace revisit

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include <Eigen/Geometry>
+
+#include <revisit/core/ids.hpp>
+
+namespace revisit {
+
+/// A rigid transform. `T_a_b` maps coordinates of frame b into frame a; products chain by name.
+using Pose = Eigen::Isometry3d;
+
+inline constexpr double kPi = 3.14159265358979323846;
+inline double to_degrees(double rad) { return rad * 180.0 / kPi; }
+inline double to_radians(double deg) { return deg * kPi / 180.0; }
+
+/// The same angle in [-pi, pi).
+inline double wrap_angle(double rad) {
+  const double turned = std::fmod(rad + kPi, 2.0 * kPi);
+  return (turned < 0.0 ? turned + 2.0 * kPi : turned) - kPi;
+}
+
+/// The angle of the rotation, radians in [0, pi].
+inline double rotation_angle(const Pose& T) { return Eigen::AngleAxisd(T.rotation()).angle(); }
+
+/// Heading of the x axis seen from above, radians.
+inline double yaw_of(const Pose& T) { return std::atan2(T.linear()(1, 0), T.linear()(0, 0)); }
+
+/// Poses of the LiDAR at scan time, by frame; a frame without an entry has no known pose.
+struct Trajectory {
+  struct Entry {
+    double stamp_s = 0.0;
+    Pose T_world_lidar = Pose::Identity();
+  };
+  std::map<FrameId, Entry> entries;
+
+  std::optional<Pose> at(FrameId frame) const {
+    const auto found = entries.find(frame);
+    if (found == entries.end()) return std::nullopt;
+    return found->second.T_world_lidar;
+  }
+  bool empty() const { return entries.empty(); }
+};
+
+}  // namespace revisit

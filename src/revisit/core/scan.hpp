@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <revisit/core/ids.hpp>
+
+namespace revisit {
+
+/// One LiDAR return: position in metres in the LiDAR frame (x forward, y left, z up), and intensity,
+/// in the sensor's own unit as read and in [0, 1] after normalisation.
+struct Point {
+  float x = 0.f, y = 0.f, z = 0.f, intensity = 0.f;
+};
+static_assert(sizeof(Point) == 16, "the point loops read four floats at a time");
+
+/// One sweep of a LiDAR. `rings` and `times_s` are empty or hold one entry a point.
+struct Scan {
+  FrameId frame;
+  double stamp_s = 0.0;                 ///< time of the scan, seconds, any epoch
+  std::vector<Point> points;            ///< finite, never (0,0,0): readers drop and count those
+  std::vector<std::uint16_t> rings;     ///< laser ring of each point, any numbering
+  std::vector<float> times_s;           ///< time of each point from the scan's first one, seconds
+  std::size_t dropped_non_finite = 0;   ///< points left out by the reader: NaN or infinite
+  std::size_t dropped_at_origin = 0;    ///< points left out by the reader: exactly (0,0,0), "no return"
+};
+
+/// Keeps the points whose index satisfies `keep`, with their rings and times, in their order.
+template <typename Predicate>
+void keep_points(Scan& scan, Predicate keep) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    if (!keep(i)) continue;
+    scan.points[kept] = scan.points[i];
+    if (!scan.rings.empty()) scan.rings[kept] = scan.rings[i];
+    if (!scan.times_s.empty()) scan.times_s[kept] = scan.times_s[i];
+    ++kept;
+  }
+  scan.points.resize(kept);
+  if (!scan.rings.empty()) scan.rings.resize(kept);
+  if (!scan.times_s.empty()) scan.times_s.resize(kept);
+}
+
+}  // namespace revisit

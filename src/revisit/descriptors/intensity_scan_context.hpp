@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <revisit/config/parameters.hpp>
+#include <revisit/core/scan.hpp>
+
+namespace revisit {
+
+/// Intensity scan context Omega (paper, eqs. 2-5) and its binary image I (eq. 6): a polar grid of `rings` x `sectors`
+/// cells around the sensor. Ring i holds rho in [i, i + 1) * L_max / N_r, sector j holds
+/// theta in [j, j + 1) * 2 pi / N_s - pi. Arrays are sector-major: the column of sector j is contiguous.
+struct IntensityScanContext {
+  int rings = 0;    ///< N_r
+  int sectors = 0;  ///< N_s
+  std::vector<std::uint8_t> intensity;   ///< [sector * rings + ring]: largest intensity of the cell, 255 = 1.0; 0 if empty
+  std::vector<std::uint64_t> occupancy;  ///< bit sector * rings + ring: the cell holds a point, whatever its intensity
+
+  std::size_t cells() const { return intensity.size(); }
+  bool occupied(int ring, int sector) const {
+    const auto bit = static_cast<std::size_t>(sector * rings + ring);
+    return (occupancy[bit / 64] >> (bit % 64) & 1u) != 0;
+  }
+  int occupied_cells() const;
+};
+
+/// The 8-bit form of an intensity in [0, 1]; values outside are cut, NaN is 0.
+std::uint8_t quantise_intensity(float intensity);
+
+/// Describes points with intensities in [0, 1]; points beyond options.max_range_m (in the x-y plane) are left out.
+/// A pass over the points with SIMD chosen at run time; the cell of every point is that of exact arithmetic in double.
+/// Throws std::invalid_argument where the grid is outside the allowed range. Safe to call from several threads.
+IntensityScanContext describe(std::span<const Point> points, const DescriptorOptions& options);
+
+/// describe() into memory that is reused: allocates nothing from the second call on the same grid.
+class Describer {
+ public:
+  explicit Describer(const DescriptorOptions& options);
+  void describe(std::span<const Point> points, IntensityScanContext& result);
+
+ private:
+  DescriptorOptions options_;
+  std::vector<std::uint16_t> cells_;  ///< 0 = empty, 1 + quantised intensity otherwise; one more for points beyond the range
+};
+
+}  // namespace revisit

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include <revisit/io/internal/bytes.hpp>
+#include <revisit/io/internal/scan_formats.hpp>
+
+namespace revisit::io_internal {
+namespace {
+
+constexpr std::size_t kKittiBytes = 4 * sizeof(float);     // x y z intensity
+constexpr std::size_t kNuscenesBytes = 5 * sizeof(float);  // and ring
+constexpr std::size_t kNcltBytes = 8;                      // uint16 x y z, uint8 intensity, uint8 laser
+constexpr float kLargestCoordinate = 5000.f;               // metres; beyond any LiDAR
+constexpr float kLargestRing = 255.f;
+
+template <typename T>
+T load(const char* bytes) {
+  T value;
+  std::memcpy(&value, bytes, sizeof value);
+  return value;
+}
+
+// A number that a sensor could have written: no value, zero, or of a size that metres and intensities have.
+// Floats made from other data mostly have wild exponents.
+bool is_plausible(float value) {
+  const float size = std::abs(value);
+  return !std::isfinite(value) || size == 0.f || (size > 1e-9f && size < 1e6f);
+}
+
+// The share of the records that pass `test`; every n-th one is looked at, some 4,000 in all.
+template <typename Test>
+double share_of_records(const std::string& bytes, std::size_t record_bytes, Test test) {
+  const std::size_t records = bytes.size() / record_bytes;
+  const std::size_t step = std::max<std::size_t>(1, records / 4000);
+  std::size_t tested = 0, passed = 0;
+  for (std::size_t i = 0; i < records; i += step, ++tested) passed += test(bytes.data() + i * record_bytes);
+  return tested == 0 ? 0.0 : static_cast<double>(passed) / static_cast<double>(tested);
+}
+
+bool is_plausible_point(const char* record) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    const float value = load<float>(record + i * sizeof(float));
+    if (!is_plausible(value) || (std::isfinite(value) && std::abs(value) > kLargestCoordinate)) return false;
+  }
+  return is_plausible(load<float>(record + 3 * sizeof(float)));
+}
+
+bool is_nuscenes(const std::string& bytes) {
+  if (bytes.size() % kNuscenesBytes != 0) return false;
+  bool any_ring = false;
+  const double share = share_of_records(bytes, kNuscenesBytes, [&](const char* record) {
+    const float ring = load<float>(record + kKittiBytes);
+    any_ring |= ring > 0.f;
+    return ring >= 0.f && ring <= kLargestRing && ring == std::floor(ring) && is_plausible_point(record);
+  });
+  return share == 1.0 && any_ring;
+}
+
+bool is_kitti(const std::string& bytes) {
+  return bytes.size() % kKittiBytes == 0 && share_of_records(bytes, kKittiBytes, is_plausible_point) > 0.999;
+}
+
+bool is_nclt(const std::string& bytes) {
+  return bytes.size() % kNcltBytes == 0 &&
+         share_of_records(bytes, kNcltBytes, [](const char* record) { return load<std::uint8_t>(record + 7) < 32; }) ==
+             1.0;
+}
+
+Scan read_floats(const std::string& bytes, std::size_t record_bytes) {
+  Scan scan;
+  const std::size_t records = bytes.size() / record_bytes;
+  const bool has_rings = record_bytes == kNuscenesBytes;
+  scan.points.reserve(records);
+  if (has_rings) scan.rings.reserve(records);
+  for (std::size_t i = 0; i < records; ++i) {
+    const char* record = bytes.data() + i * record_bytes;
+    if (append_point(scan, load<Point>(record)) && has_rings)
+      scan.rings.push_back(static_cast<std::uint16_t>(load<float>(record + kKittiBytes)));
+  }
+  return scan;
+}
+
+Scan read_nclt(const std::string& bytes) {
+  Scan scan;
+  const auto metres = [](const char* at) { return static_cast<float>(load<std::uint16_t>(at) * 0.005 - 100.0); };
+  for (std::size_t i = 0; i + kNcltBytes <= bytes.size(); i += kNcltBytes) {
+    const char* record = bytes.data() + i;
+    // NCLT's frame has x forward, y right, z down; ours has y left, z up.
+    const Point point{metres(record), -metres(record + 2), -metres(record + 4),
+                      static_cast<float>(load<std::uint8_t>(record + 6))};
+    if (append_point(scan, point)) scan.rings.push_back(load<std::uint8_t>(record + 7));
+  }
+  return scan;
+}
+
+}  // namespace
+
+Result<Scan> read_bin(const std::filesystem::path& file) {
+  const auto bytes = read_bytes(file);
+  if (!bytes) return bytes.error();
+  if (bytes->empty()) return Error{file.string() + ": empty file"};
+  if (is_nuscenes(*bytes)) return read_floats(*bytes, kNuscenesBytes);
+  if (is_kitti(*bytes)) return read_floats(*bytes, kKittiBytes);
+  if (is_nclt(*bytes)) return read_nclt(*bytes);
+  const std::string size = std::to_string(bytes->size()) + " bytes";
+  if (bytes->size() % kKittiBytes != 0)
+    return Error{file.string() + ": " + size + " is no multiple of 16 (x y z intensity, float32): truncated?"};
+  return Error{file.string() + ": " + size + " hold neither float32 x y z intensity [ring] in metres nor NCLT points"};
+}
+
+}  // namespace revisit::io_internal

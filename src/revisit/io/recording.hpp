@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <revisit/core/log.hpp>
+#include <revisit/core/pose.hpp>
+#include <revisit/core/result.hpp>
+#include <revisit/core/scan.hpp>
+
+namespace revisit {
+
+/// A sequence of scans in the order of their frame numbers, read one by one. Reading is safe from several threads.
+class Recording {
+ public:
+  virtual ~Recording() = default;
+
+  virtual std::size_t size() const = 0;
+  /// Frame and stamp of scan `index` in [0, size()); without times, 0.1 s a frame.
+  virtual FrameId frame(std::size_t index) const = 0;
+  virtual double stamp_s(std::size_t index) const = 0;
+  /// The scan with its frame and stamp, or what is wrong with its file.
+  virtual Result<Scan> read(std::size_t index) const = 0;
+
+  virtual std::string kind() const = 0;  ///< e.g. "KITTI odometry folder"
+  virtual bool has_times() const = 0;
+  /// LiDAR poses that came with the recording, for the frames that have one; may be empty.
+  virtual const Trajectory& trajectory() const = 0;
+  /// Calibration of a KITTI camera, for pose files in its frame.
+  virtual std::optional<Pose> T_camera_lidar() const = 0;
+};
+
+/// Opens a KITTI odometry folder (velodyne/, times.txt, calib.txt, poses.txt), a KITTI raw drive
+/// (velodyne_points/data/, oxts/), or a bare folder of .bin, .pcd or .ply scans. Poses, times and calibration that are
+/// there but broken are errors; scans are only looked at when they are read.
+Result<std::unique_ptr<Recording>> open_recording(const std::filesystem::path& folder, const LogSink& log = {});
+
+/// The calibration `Tr` in a KITTI calib.txt, LiDAR to camera.
+Result<Pose> read_camera_calibration(const std::filesystem::path& file);
+
+}  // namespace revisit

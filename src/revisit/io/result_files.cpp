@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/io/result_files.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iomanip>
+
+#include <revisit/io/internal/bytes.hpp>
+#include <revisit/io/internal/text_writer.hpp>
+
+namespace revisit {
+namespace {
+
+namespace fs = std::filesystem;
+using io_internal::TextWriter;
+
+constexpr const char* kCandidateHeader = "query,match,score,accepted,reason";
+constexpr const char* kLoopHeader = "query,match,score,tx,ty,tz,qx,qy,qz,qw,inlier_ratio,rmse_m";
+
+std::vector<std::string_view> split_cells(std::string_view line) {
+  std::vector<std::string_view> cells;
+  for (;;) {
+    const auto comma = line.find(',');
+    cells.push_back(line.substr(0, comma));
+    if (comma == std::string_view::npos) return cells;
+    line.remove_prefix(comma + 1);
+  }
+}
+
+std::optional<double> number(std::string_view cell) {
+  const auto values = io_internal::parse_numbers(cell);
+  if (!values || values->size() != 1) return std::nullopt;
+  return (*values)[0];
+}
+
+std::optional<FrameId> frame(std::string_view cell) {
+  const auto value = number(cell);
+  if (!value || !(*value >= 0.0 && *value < 1e15) || *value != std::floor(*value)) return std::nullopt;
+  return FrameId{static_cast<std::int64_t>(*value)};
+}
+
+// Calls `read_row` with the cells of each row; a row it refuses is an error that names file and line.
+template <typename ReadRow>
+Status read_csv(const fs::path& file, std::string_view header, ReadRow read_row) {
+  const auto text = io_internal::read_bytes(file);
+  if (!text) return text.error();
+  const auto lines = io_internal::split_lines(*text);
+  if (lines.empty() || lines[0] != header) return Error{file.string() + ": the first line must be '" + std::string(header) + "'"};
+  for (std::size_t i = 1; i < lines.size(); ++i) {
+    if (lines[i].empty()) continue;
+    if (!read_row(split_cells(lines[i])))
+      return Error{file.string() + ":" + std::to_string(i + 1) + ": '" + std::string(lines[i].substr(0, 80)) +
+                   "' does not fit '" + std::string(header) + "'"};
+  }
+  return ok();
+}
+
+}  // namespace
+
+struct ResultWriter::Files {
+  TextWriter candidates, loops;
+};
+
+ResultWriter::ResultWriter(std::unique_ptr<Files> files) : files_(std::move(files)) {}
+ResultWriter::ResultWriter(ResultWriter&&) noexcept = default;
+ResultWriter& ResultWriter::operator=(ResultWriter&&) noexcept = default;
+ResultWriter::~ResultWriter() = default;
+
+Result<ResultWriter> ResultWriter::create(const fs::path& folder, bool overwrite) {
+  std::error_code failure;
+  fs::create_directories(folder, failure);
+  if (failure) return Error{folder.string() + ": cannot be created: " + failure.message()};
+  if (const fs::path existing = folder / "candidates.csv"; !overwrite && fs::exists(existing, failure))
+    return Error{folder.string() + ": already holds a result; name another folder or pass --overwrite"};
+  ResultWriter writer(
+      std::make_unique<Files>(Files{TextWriter(folder / "candidates.csv"), TextWriter(folder / "loops.csv")}));
+  writer.files_->candidates.stream() << kCandidateHeader << '\n';
+  writer.files_->loops.stream() << kLoopHeader << '\n' << std::setprecision(10);
+  for (TextWriter* each : {&writer.files_->candidates, &writer.files_->loops})
+    if (const Status status = each->flush(); !status) return status.error();
+  return writer;
+}
+
+Status ResultWriter::add(const CandidateRow& row) {
+  auto& out = files_->candidates.stream();
+  std::string reason = row.reason;
+  std::replace_if(reason.begin(), reason.end(), [](char c) { return c == ',' || c == '\n' || c == '"'; }, ';');
+  out << row.query.value << ',';
+  if (row.match) out << row.match->value;
+  out << ',' << std::setprecision(6) << row.score << ',' << (row.accepted ? 1 : 0) << ',' << reason << '\n';
+  return files_->candidates.flush();
+}
+
+Status ResultWriter::add(const LoopRow& row) {
+  auto& out = files_->loops.stream();
+  const LoopConstraint& loop = row.constraint;
+  const Eigen::Vector3d t = loop.T_match_query.translation();
+  const Eigen::Quaterniond q = Eigen::Quaterniond(loop.T_match_query.rotation()).normalized();
+  out << loop.query.value << ',' << loop.match.value;
+  for (const double value : {row.score, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w(), loop.inlier_ratio, loop.rmse_m})
+    out << ',' << value;
+  out << '\n';
+  return files_->loops.flush();
+}
+
+Status ResultWriter::finish() {
+  const Status candidates = files_->candidates.finish();
+  const Status loops = files_->loops.finish();
+  return candidates ? loops : candidates;
+}
+
+Result<std::vector<CandidateRow>> read_candidates(const fs::path& file) {
+  std::vector<CandidateRow> rows;
+  const Status status = read_csv(file, kCandidateHeader, [&](const std::vector<std::string_view>& cells) {
+    if (cells.size() != 5) return false;
+    CandidateRow row;
+    const auto query = frame(cells[0]);
+    const auto score = number(cells[2]);
+    if (!query || !score || !std::isfinite(*score) || (cells[3] != "0" && cells[3] != "1")) return false;
+    if (!cells[1].empty()) {
+      row.match = frame(cells[1]);
+      if (!row.match) return false;
+    }
+    row.query = *query;
+    row.score = *score;
+    row.accepted = cells[3] == "1";
+    row.reason = cells[4];
+    rows.push_back(row);
+    return true;
+  });
+  if (!status) return status.error();
+  return rows;
+}
+
+Result<std::vector<LoopRow>> read_loops(const fs::path& file) {
+  std::vector<LoopRow> rows;
+  const Status status = read_csv(file, kLoopHeader, [&](const std::vector<std::string_view>& cells) {
+    if (cells.size() != 12) return false;
+    const auto query = frame(cells[0]), match = frame(cells[1]);
+    std::array<double, 10> v{};
+    for (std::size_t i = 0; i < v.size(); ++i) {
+      const auto value = number(cells[i + 2]);
+      if (!value || !std::isfinite(*value)) return false;
+      v[i] = *value;
+    }
+    const Eigen::Quaterniond q(v[7], v[4], v[5], v[6]);
+    if (!query || !match || std::abs(q.norm() - 1.0) > 1e-2) return false;
+    LoopRow row;
+    row.score = v[0];
+    row.constraint.query = *query;
+    row.constraint.match = *match;
+    row.constraint.T_match_query.linear() = q.normalized().toRotationMatrix();
+    row.constraint.T_match_query.translation() << v[1], v[2], v[3];
+    row.constraint.inlier_ratio = v[8];
+    row.constraint.rmse_m = v[9];
+    rows.push_back(row);
+    return true;
+  });
+  if (!status) return status.error();
+  return rows;
+}
+
+Status write_text(const fs::path& file, const std::string& text) {
+  TextWriter writer(file);
+  writer.stream() << text;
+  return writer.finish();
+}
+
+}  // namespace revisit

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include <revisit/core/result.hpp>
+#include <revisit/core/results.hpp>
+
+namespace revisit {
+
+/// Writes candidates.csv and loops.csv row by row; each row is complete and with the system when `add` returns,
+/// so that nothing computed is lost. Not for several threads.
+class ResultWriter {
+ public:
+  /// Creates `folder` and both files. An existing result is an error unless `overwrite`.
+  static Result<ResultWriter> create(const std::filesystem::path& folder, bool overwrite);
+  ResultWriter(ResultWriter&&) noexcept;
+  ResultWriter& operator=(ResultWriter&&) noexcept;
+  ~ResultWriter();
+
+  Status add(const CandidateRow& row);
+  Status add(const LoopRow& row);
+  Status finish();
+
+ private:
+  struct Files;
+  explicit ResultWriter(std::unique_ptr<Files> files);
+  std::unique_ptr<Files> files_;
+};
+
+/// Read what ResultWriter, or any other program that follows the format, wrote (docs/formats.md).
+Result<std::vector<CandidateRow>> read_candidates(const std::filesystem::path& file);
+Result<std::vector<LoopRow>> read_loops(const std::filesystem::path& file);
+
+/// Writes `text` (a report, JSON) whole; a failure names the file and the reason.
+Status write_text(const std::filesystem::path& file, const std::string& text);
+
+}  // namespace revisit

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/io/scan_file.hpp>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <exception>
+
+#include <revisit/io/internal/scan_formats.hpp>
+
+namespace revisit {
+namespace {
+
+std::string lower_extension(const std::filesystem::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+Result<Scan> read_any(const std::filesystem::path& file, const LogSink& log) {
+  const std::string extension = lower_extension(file);
+  if (extension == ".bin") return io_internal::read_bin(file);
+  if (extension == ".pcd") return io_internal::read_pcd(file, log);
+  if (extension == ".ply") return io_internal::read_ply(file, log);
+  if (extension == ".pcap")
+    return Error{file.string() + ": captured packets (pcap) are not supported yet; convert them to .pcd first"};
+  if (extension == ".bag" || extension == ".mcap" || extension == ".db3")
+    return Error{file.string() + ": ROS bags are not supported yet; convert the scans to .pcd first"};
+  return Error{file.string() + ": unknown kind of file '" + extension + "'; allowed: .bin, .pcd, .ply"};
+}
+
+}  // namespace
+
+namespace io_internal {
+
+bool append_point(Scan& scan, const Point& point) {
+  if (!(std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z))) {
+    ++scan.dropped_non_finite;
+    return false;
+  }
+  if (point.x == 0.f && point.y == 0.f && point.z == 0.f) {
+    ++scan.dropped_at_origin;
+    return false;
+  }
+  scan.points.push_back(point);
+  if (!std::isfinite(point.intensity)) scan.points.back().intensity = 0.f;
+  return true;
+}
+
+}  // namespace io_internal
+
+bool has_scan_extension(const std::filesystem::path& file) {
+  const std::string extension = lower_extension(file);
+  return extension == ".bin" || extension == ".pcd" || extension == ".ply";
+}
+
+Result<Scan> read_scan(const std::filesystem::path& file, const LogSink& log) {
+  try {
+    Result<Scan> scan = read_any(file, log);
+    if (scan && scan->points.empty())
+      return Error{file.string() + ": no usable point: " + std::to_string(scan->dropped_non_finite) +
+                   " not finite, " + std::to_string(scan->dropped_at_origin) + " at (0,0,0)"};
+    return scan;
+  } catch (const std::exception& problem) {  // what the readers underneath throw on broken files
+    return Error{file.string() + ": cannot be read: " + problem.what()};
+  }
+}
+
+}  // namespace revisit

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <functional>
+
+#include <revisit/config/parameters.hpp>
+#include <revisit/core/log.hpp>
+#include <revisit/core/result.hpp>
+#include <revisit/io/recording.hpp>
+#include <revisit/preprocess/calibration_learning.hpp>
+
+namespace revisit {
+
+/// Learns phi(eta, d) from a recording alone, its intensities brought to [0, 1] first. Poses come from the recording
+/// where it has them; otherwise neighbouring scans are registered, and runs that cannot be are left out.
+/// `progress(done, total)` is called after each scan and stops the work by returning false.
+Result<CalibrationReport> calibrate_recording(const Recording& recording, const Parameters& parameters,
+                                              std::size_t most_scans, const LogSink& log,
+                                              const std::function<bool(std::size_t, std::size_t)>& progress);
+
+}  // namespace revisit

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/pipeline/loop_detector.hpp>
+
+#include <algorithm>
+#include <cstdio>
+#include <numeric>
+#include <stdexcept>
+
+namespace revisit {
+
+CandidateRow Detection::row() const {
+  CandidateRow row;
+  row.query = frame;
+  if (answer) row.match = answer->match;
+  row.score = score;
+  row.accepted = loop.has_value();
+  row.reason = reason;
+  return row;
+}
+
+LoopDetector::LoopDetector(const Parameters& parameters, std::optional<IntensityScale> scale,
+                           IntensityCalibration calibration, LogSink log)
+    : parameters_(parameters),
+      scale_(std::move(scale)),
+      calibration_(std::move(calibration)),
+      log_(std::move(log)),
+      index_(parameters.retrieval) {
+  if (const Status status = validate(parameters); !status) throw std::invalid_argument(status.error().message);
+}
+
+Result<Detection> LoopDetector::process(Scan scan, const std::optional<Pose>& T_world_lidar) {
+  auto prepared = prepare(std::move(scan));
+  if (!prepared) return prepared.error();
+  Detection detection = detect(*prepared, T_world_lidar, Past::kOldEnough);
+  remember(*std::move(prepared), T_world_lidar);
+  return detection;
+}
+
+Status LoopDetector::add(Scan scan, const std::optional<Pose>& T_world_lidar) {
+  auto prepared = prepare(std::move(scan));
+  if (!prepared) return prepared.error();
+  remember(*std::move(prepared), T_world_lidar);
+  return ok();
+}
+
+Result<Detection> LoopDetector::localise(Scan scan) {
+  const auto prepared = prepare(std::move(scan));
+  if (!prepared) return prepared.error();
+  return detect(*prepared, std::nullopt, Past::kAll);
+}
+
+Result<PreparedScan> LoopDetector::prepare(Scan scan) {
+  if (!scale_) {
+    scale_ = estimate_intensity_scale(std::span<const Scan>(&scan, 1), parameters_.intensity);
+    if (!scale_->warning.empty()) log_to(log_, LogLevel::kWarning, scale_->warning);
+  }
+  auto prepared = prepare_scan(std::move(scan), parameters_, *scale_, calibration_);
+  if (prepared && !rings_were_reported_) {
+    rings_were_reported_ = true;
+    log_to(log_, prepared->ground.rings == RingSource::kNone ? LogLevel::kWarning : LogLevel::kInfo,
+           prepared->ground.rings == RingSource::kNone
+               ? "no laser rings found: ground is segmented on a polar grid instead of the range image"
+               : std::to_string(prepared->ground.ring_count) + " laser rings, " + to_string(prepared->ground.rings));
+  }
+  return prepared;
+}
+
+Detection LoopDetector::detect(const PreparedScan& prepared, const std::optional<Pose>& T_world_lidar, Past past) {
+  Detection detection;
+  detection.frame = prepared.scan.frame;
+  detection.points = prepared.scan.points.size();
+  detection.ground_points = std::accumulate(prepared.ground.is_ground.begin(), prepared.ground.is_ground.end(),
+                                            std::size_t{0});
+  detection.rings = prepared.ground.rings;
+  detection.preparation_ms = prepared.ms;
+
+  Stopwatch watch;
+  const double stamp_s = prepared.scan.stamp_s;
+  detection.had_searchable_past =
+      past == Past::kAll ? index_.size() > 0 : index_.has_searchable_past(detection.frame, stamp_s);
+  detection.candidates = past == Past::kAll ? index_.search_all(prepared.descriptor)
+                                            : index_.search(detection.frame, stamp_s, prepared.descriptor);
+  detection.search_ms = watch.lap_ms();
+  if (detection.candidates.empty())
+    detection.reason = detection.had_searchable_past ? "no place like it" : "no searchable past";
+  else
+    verify(detection, prepared);
+
+  if (detection.answer && T_world_lidar)
+    if (const auto& T_world_match = places_.at(detection.answer->match).T_world_lidar)
+      detection.T_match_query_by_odometry = T_world_match->inverse() * *T_world_lidar;
+
+  recent_queries_.emplace_back(detection.frame, prepared.descriptor);
+  while (recent_queries_.size() > static_cast<std::size_t>(parameters_.temporal.frames)) recent_queries_.pop_front();
+  return detection;
+}
+
+void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
+  const auto query_descriptor = [&](FrameId frame) -> const IntensityScanContext* {
+    const auto found = std::find_if(recent_queries_.begin(), recent_queries_.end(),
+                                    [&](const auto& each) { return each.first == frame; });
+    return found == recent_queries_.end() ? nullptr : &found->second;
+  };
+  const auto match_descriptor = [&](FrameId frame) { return index_.find(frame); };
+  std::optional<SurfaceCloud> query_cloud;
+  const auto count = std::min(detection.candidates.size(), static_cast<std::size_t>(parameters_.geometric.candidates));
+  for (std::size_t i = 0; i < count; ++i) {
+    const LoopCandidate& candidate = detection.candidates[i];
+    std::optional<GeometricEvidence> geometric;
+    std::string reason;
+    Stopwatch watch;
+    TemporalEvidence temporal =
+        check_temporal(detection.frame, candidate.match, query_descriptor, match_descriptor, parameters_.temporal);
+    detection.temporal_ms += watch.lap_ms();
+    if (candidate.score() < parameters_.geometric.min_descriptor_score) {
+      char text[96];
+      std::snprintf(text, sizeof text, "descriptor score %.3f below %.3f", candidate.score(),
+                    parameters_.geometric.min_descriptor_score);
+      reason = text;
+    } else if (!temporal.consistent) {
+      reason = temporal.reason;
+    } else {
+      if (!query_cloud) query_cloud.emplace(prepared.cloud);
+      geometric = check_geometric(SurfaceCloud(places_.at(candidate.match).cloud), *query_cloud, candidate.yaw_rad,
+                                  parameters_.geometric);
+      detection.geometric_ms += watch.lap_ms();
+      reason = geometric->reason;
+    }
+    // The answer is the first candidate, unless a later one fits the scan better.
+    const double score = candidate.score() / 2.0 + (geometric ? geometric->inlier_ratio : 0.0);
+    if (detection.answer && !(reason.empty() && !detection.loop) && score <= detection.score) continue;
+    detection.answer = candidate;
+    detection.temporal = std::move(temporal);
+    detection.score = score;
+    detection.reason = reason;
+    detection.geometric = std::move(geometric);
+    if (reason.empty()) {
+      detection.loop = LoopConstraint{detection.frame, candidate.match, detection.geometric->T_match_query,
+                                      detection.geometric->inlier_ratio, detection.geometric->rmse_m};
+      return;
+    }
+  }
+}
+
+void LoopDetector::remember(PreparedScan prepared, const std::optional<Pose>& T_world_lidar) {
+  index_.add(prepared.scan.frame, prepared.scan.stamp_s, std::move(prepared.descriptor));
+  places_[prepared.scan.frame] = {std::move(prepared.cloud), T_world_lidar};
+}
+
+}  // namespace revisit

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <revisit/core/results.hpp>
+#include <revisit/pipeline/prepare.hpp>
+#include <revisit/retrieval/place_index.hpp>
+#include <revisit/verification/geometric.hpp>
+#include <revisit/verification/temporal.hpp>
+
+namespace revisit {
+
+/// Everything found out about one scan.
+struct Detection {
+  FrameId frame;
+  bool had_searchable_past = false;
+  std::vector<LoopCandidate> candidates;      ///< what retrieval proposed, best first
+  std::optional<LoopCandidate> answer;        ///< the candidate that the rest of the evidence is about
+  std::optional<TemporalEvidence> temporal;   ///< of the answer; absent where no candidate was found
+  std::optional<GeometricEvidence> geometric; ///< of the answer; absent where it was refused before registration
+  std::optional<LoopConstraint> loop;         ///< set where the answer was accepted
+  double score = 0.0;   ///< confidence that orders answers: mean descriptor score, plus the inlier ratio if registered
+  std::string reason;   ///< why there is no loop; empty where there is one
+  std::optional<Pose> T_match_query_by_odometry;  ///< for comparison, where both scans came with a pose
+
+  std::size_t points = 0, ground_points = 0;
+  RingSource rings = RingSource::kNone;
+  PreparedScan::Milliseconds preparation_ms;
+  double search_ms = 0.0, temporal_ms = 0.0, geometric_ms = 0.0;
+
+  CandidateRow row() const;
+};
+
+/// The whole method, online: scans in, loop closures out. Feed frames in increasing order.
+/// One detector belongs to one thread at a time.
+class LoopDetector {
+ public:
+  /// Without a `scale`, the first scan decides it. Throws std::invalid_argument for parameters out of range.
+  explicit LoopDetector(const Parameters& parameters, std::optional<IntensityScale> scale = std::nullopt,
+                        IntensityCalibration calibration = {}, LogSink log = {});
+
+  /// Looks for the scan's place among those old enough (exclusion of the recent past), then adds it.
+  /// `T_world_lidar`, if there is one, is odometry: recorded as evidence, never used to decide.
+  /// An error says why this scan describes no place; the detector goes on with the next.
+  Result<Detection> process(Scan scan, const std::optional<Pose>& T_world_lidar = std::nullopt);
+
+  /// Adds a place without looking for it: building a map.
+  Status add(Scan scan, const std::optional<Pose>& T_world_lidar = std::nullopt);
+
+  /// Looks for the scan's place among all that were added, and adds nothing: where am I in this map?
+  Result<Detection> localise(Scan scan);
+
+  const PlaceIndex& index() const { return index_; }
+
+ private:
+  struct Place {
+    ThinCloud cloud;
+    std::optional<Pose> T_world_lidar;
+  };
+  enum class Past { kOldEnough, kAll };
+
+  Result<PreparedScan> prepare(Scan scan);
+  Detection detect(const PreparedScan& prepared, const std::optional<Pose>& T_world_lidar, Past past);
+  void verify(Detection& detection, const PreparedScan& prepared);
+  void remember(PreparedScan prepared, const std::optional<Pose>& T_world_lidar);
+
+  Parameters parameters_;
+  std::optional<IntensityScale> scale_;
+  IntensityCalibration calibration_;
+  LogSink log_;
+  bool rings_were_reported_ = false;
+  PlaceIndex index_;
+  std::map<FrameId, Place> places_;
+  std::deque<std::pair<FrameId, IntensityScanContext>> recent_queries_;  ///< the last N, for temporal consistency
+};
+
+}  // namespace revisit

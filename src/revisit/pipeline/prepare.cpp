@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/pipeline/prepare.hpp>
+
+#include <algorithm>
+#include <chrono>
+
+#include <revisit/preprocess/range_filter.hpp>
+#include <revisit/preprocess/rings.hpp>
+
+namespace revisit {
+namespace {
+
+double now_ms() {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+std::vector<Point> above_ground(const Scan& scan, const std::vector<std::uint8_t>& is_ground) {
+  std::vector<Point> points;
+  points.reserve(scan.points.size());
+  for (std::size_t i = 0; i < scan.points.size(); ++i)
+    if (is_ground[i] == 0) points.push_back(scan.points[i]);
+  return points;
+}
+
+}  // namespace
+
+Stopwatch::Stopwatch() : last_ms_(now_ms()) {}
+
+double Stopwatch::lap_ms() {
+  const double now = now_ms(), lap = now - last_ms_;
+  last_ms_ = now;
+  return lap;
+}
+
+Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const IntensityScale& scale,
+                                  const IntensityCalibration& calibration) {
+  PreparedScan prepared;
+  prepared.scan = std::move(scan);
+  Stopwatch watch;
+  filter_range(prepared.scan, parameters.preprocess);
+  prepared.ms.filter = watch.lap_ms();
+
+  const Rings rings = find_rings(prepared.scan);
+  prepared.ground = segment_ground(prepared.scan, rings, parameters.preprocess);
+  prepared.ms.ground = watch.lap_ms();
+
+  // Ring gains fit only the sensor that they were learnt with.
+  const bool rings_fit = rings.count() == calibration.ring_gains.size();
+  normalise_intensity(prepared.scan, scale, calibration,
+                      rings_fit ? std::span<const std::uint16_t>(rings.of_point) : std::span<const std::uint16_t>());
+  prepared.ms.intensity = watch.lap_ms();
+
+  prepared.descriptor = describe(parameters.preprocess.remove_ground
+                                     ? above_ground(prepared.scan, prepared.ground.is_ground)
+                                     : prepared.scan.points,
+                                 parameters.descriptor);
+  prepared.ms.describe = watch.lap_ms();
+  if (prepared.descriptor.occupied_cells() < parameters.descriptor.min_occupied_cells)
+    return Error{"frame " + std::to_string(prepared.scan.frame.value) + ": " +
+                 std::to_string(prepared.scan.points.size()) + " usable points occupy " +
+                 std::to_string(prepared.descriptor.occupied_cells()) + " of " +
+                 std::to_string(prepared.descriptor.cells()) + " cells; at least " +
+                 std::to_string(parameters.descriptor.min_occupied_cells) + " are needed to describe a place"};
+
+  prepared.cloud = thin(prepared.scan.points, prepared.ground.is_ground, parameters.geometric.voxel_m);
+  prepared.ms.thin = watch.lap_ms();
+  return prepared;
+}
+
+Result<IntensityScale> estimate_intensity_scale(const Recording& recording, const Parameters& parameters) {
+  constexpr std::size_t kSamples = 10;
+  std::vector<Scan> sample;
+  std::optional<Error> first_error;
+  const std::size_t count = std::min(kSamples, recording.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    auto scan = recording.read(i * recording.size() / count);
+    if (scan)
+      sample.push_back(*std::move(scan));
+    else if (!first_error)
+      first_error = scan.error();
+  }
+  if (sample.empty()) return first_error.value_or(Error{"the recording holds no scan"});
+  return estimate_intensity_scale(std::span<const Scan>(sample), parameters.intensity);
+}
+
+}  // namespace revisit

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+
+#include <revisit/config/parameters.hpp>
+#include <revisit/core/intensity_calibration.hpp>
+#include <revisit/core/log.hpp>
+#include <revisit/core/result.hpp>
+#include <revisit/core/scan.hpp>
+#include <revisit/descriptors/intensity_scan_context.hpp>
+#include <revisit/io/recording.hpp>
+#include <revisit/preprocess/ground.hpp>
+#include <revisit/preprocess/intensity.hpp>
+#include <revisit/registration/surface_cloud.hpp>
+
+namespace revisit {
+
+/// A scan made ready: filtered by range, ground found, intensity in [0, 1]; then described and thinned.
+struct PreparedScan {
+  Scan scan;
+  GroundSegmentation ground;
+  IntensityScanContext descriptor;
+  ThinCloud cloud;  ///< for registration; the ground is kept and marked
+
+  struct Milliseconds {
+    double filter = 0.0, ground = 0.0, intensity = 0.0, describe = 0.0, thin = 0.0;
+  } ms;
+};
+
+/// The paper's sections III-A and III-B in order. An error says why the scan describes no place.
+Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const IntensityScale& scale,
+                                  const IntensityCalibration& calibration = {});
+
+/// The intensity scale of a recording, from up to ten readable scans spread over it.
+/// An error where none of them is readable: the first one's.
+Result<IntensityScale> estimate_intensity_scale(const Recording& recording, const Parameters& parameters);
+
+/// Milliseconds since the previous call (or construction), of a clock that never jumps.
+class Stopwatch {
+ public:
+  Stopwatch();
+  double lap_ms();
+
+ private:
+  double last_ms_;
+};
+
+}  // namespace revisit

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/preprocess/range_filter.hpp>
+
+namespace revisit {
+
+void filter_range(Scan& scan, const PreprocessOptions& options) {
+  const float min2 = static_cast<float>(options.min_range_m * options.min_range_m);
+  const float max2 = static_cast<float>(options.max_range_m * options.max_range_m);
+  // Written always, advanced only where kept: no branch for the processor to guess.
+  Point* points = scan.points.data();
+  std::uint16_t* rings = scan.rings.empty() ? nullptr : scan.rings.data();
+  float* times = scan.times_s.empty() ? nullptr : scan.times_s.data();
+  const std::size_t count = scan.points.size();
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Point p = points[i];
+    const float range2 = p.x * p.x + p.y * p.y + p.z * p.z;
+    points[kept] = p;
+    if (rings != nullptr) rings[kept] = rings[i];
+    if (times != nullptr) times[kept] = times[i];
+    kept += static_cast<std::size_t>((range2 >= min2) & (range2 <= max2));
+  }
+  scan.points.resize(kept);
+  if (rings != nullptr) scan.rings.resize(kept);
+  if (times != nullptr) scan.times_s.resize(kept);
+}
+
+}  // namespace revisit

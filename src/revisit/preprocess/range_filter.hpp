@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <revisit/config/parameters.hpp>
+#include <revisit/core/scan.hpp>
+
+namespace revisit {
+
+/// Drops the points nearer than min_range_m or farther than max_range_m (3-D distance from the sensor), in place and in
+/// order, with their rings and times (paper, section III-A). One pass, no allocation.
+void filter_range(Scan& scan, const PreprocessOptions& options);
+
+}  // namespace revisit

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/preprocess/rings.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <optional>
+
+#include <revisit/core/pose.hpp>
+
+namespace revisit {
+namespace {
+
+constexpr std::size_t kMostRings = 256;
+constexpr std::size_t kFewestPoints = 200;  // of a scan whose rings are worth looking for
+
+// Tangent of the elevation: grows with it, and needs no trigonometry.
+float slope(const Point& p) { return p.z / std::sqrt(p.x * p.x + p.y * p.y + 1e-12f); }
+
+// Renumbers labels [0, count) by the mean elevation of their points; labels without points vanish.
+Rings number_by_elevation(const Scan& scan, const std::vector<std::uint16_t>& labels, std::size_t count,
+                          RingSource source) {
+  std::vector<double> sums(count, 0.0);
+  std::vector<std::size_t> sizes(count, 0);
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    sums[labels[i]] += slope(scan.points[i]);
+    ++sizes[labels[i]];
+  }
+  std::vector<std::uint16_t> order;
+  for (std::size_t label = 0; label < count; ++label)
+    if (sizes[label] > 0) order.push_back(static_cast<std::uint16_t>(label));
+  const auto mean = [&](std::uint16_t label) { return sums[label] / static_cast<double>(sizes[label]); };
+  std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return mean(a) < mean(b); });
+  std::vector<std::uint16_t> ring_of_label(count, 0);
+  Rings rings;
+  rings.source = source;
+  for (std::size_t ring = 0; ring < order.size(); ++ring) {
+    ring_of_label[order[ring]] = static_cast<std::uint16_t>(ring);
+    rings.elevations_rad.push_back(static_cast<float>(std::atan(mean(order[ring]))));
+  }
+  rings.of_point.resize(labels.size());
+  for (std::size_t i = 0; i < labels.size(); ++i) rings.of_point[i] = ring_of_label[labels[i]];
+  return rings;
+}
+
+// KITTI's files hold ring after ring, each a turn that starts straight ahead: y jumps from negative to positive ahead
+// of the sensor. The turns are rings if there are enough of them and their mean elevation runs one way.
+std::optional<Rings> rings_from_order(const Scan& scan) {
+  std::vector<std::uint16_t> labels(scan.points.size());
+  std::vector<double> sums(1, 0.0);
+  std::vector<std::size_t> sizes(1, 0);
+  bool behind_seen = false;  // noise around the start must not count as a turn
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const Point& p = scan.points[i];
+    behind_seen |= p.x < 0.f;
+    if (i > 0 && behind_seen && p.x > 0.f && p.y >= 0.f && scan.points[i - 1].x > 0.f && scan.points[i - 1].y < 0.f) {
+      if (sizes.size() == kMostRings) return std::nullopt;
+      sums.push_back(0.0);
+      sizes.push_back(0);
+      behind_seen = false;
+    }
+    labels[i] = static_cast<std::uint16_t>(sizes.size() - 1);
+    sums.back() += slope(p);
+    ++sizes.back();
+  }
+  constexpr std::size_t kFewestTurns = 8;
+  if (sizes.size() < kFewestTurns) return std::nullopt;
+  std::size_t falling = 0;
+  for (std::size_t i = 1; i < sizes.size(); ++i)
+    falling += sums[i] / static_cast<double>(sizes[i]) < sums[i - 1] / static_cast<double>(sizes[i - 1]);
+  const double one_way = static_cast<double>(std::max(falling, sizes.size() - 1 - falling));
+  if (one_way < 0.9 * static_cast<double>(sizes.size() - 1)) return std::nullopt;
+  return number_by_elevation(scan, labels, sizes.size(), RingSource::kOrder);
+}
+
+// Lines in the histogram of elevations: maxima that stand clear of the valleys beside them, and are no mere echo of a
+// much fuller line next to them.
+std::vector<double> find_lines(const std::vector<double>& histogram) {
+  constexpr double kEcho = 0.15, kFaintest = 8.0;
+  std::vector<std::size_t> peaks;
+  std::size_t rising = 0;
+  double peak = 0.0, valley = 0.0;  // peak: of the line being climbed, 0 between lines
+  for (std::size_t i = 0; i < histogram.size(); ++i) {
+    const double value = histogram[i];
+    if (value > 2.0 * valley && value >= kFaintest && value > peak) {
+      rising = i;
+      peak = value;
+    }
+    if (value < 0.5 * peak) {
+      peaks.push_back(rising);
+      peak = 0.0;
+      valley = value;
+    }
+    if (peak == 0.0) valley = std::min(valley, value);
+  }
+  std::vector<double> lines;
+  for (std::size_t i = 0; i < peaks.size(); ++i) {
+    const double below = i > 0 ? histogram[peaks[i - 1]] : 0.0;
+    const double above = i + 1 < peaks.size() ? histogram[peaks[i + 1]] : 0.0;
+    if (histogram[peaks[i]] >= kEcho * std::max(below, above)) lines.push_back(static_cast<double>(peaks[i]));
+  }
+  return lines;
+}
+
+std::optional<Rings> rings_from_elevation(const Scan& scan) {
+  constexpr double kBin_rad = 0.05 / 180.0 * kPi;
+  constexpr std::size_t kBins = 3600;
+  std::vector<double> histogram(kBins, 0.0);
+  std::vector<std::uint16_t> bin_of(scan.points.size());
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const double elevation = std::atan(slope(scan.points[i]));
+    bin_of[i] = static_cast<std::uint16_t>(std::clamp((elevation + kPi / 2) / kBin_rad, 0.0, kBins - 1.0));
+    histogram[bin_of[i]] += 1.0;
+  }
+  // A line on the border of two bins must not look like two lines.
+  std::vector<double> smooth(kBins, 0.0);
+  for (std::size_t i = 1; i + 1 < kBins; ++i) smooth[i] = histogram[i - 1] + 2.0 * histogram[i] + histogram[i + 1];
+  const std::vector<double> lines = find_lines(smooth);
+  constexpr std::size_t kFewestLines = 4;
+  if (lines.size() < kFewestLines || lines.size() > kMostRings) return std::nullopt;
+
+  // Each bin belongs to the nearest line. True lines hold most points within a quarter of the gap to their
+  // neighbours, or the neighbouring bins.
+  std::vector<std::uint16_t> line_of_bin(kBins);
+  std::size_t nearest = 0;
+  double near_points = 0.0;
+  for (std::size_t bin = 0; bin < kBins; ++bin) {
+    const auto at = static_cast<double>(bin);
+    while (nearest + 1 < lines.size() && lines[nearest + 1] - at < at - lines[nearest]) ++nearest;
+    line_of_bin[bin] = static_cast<std::uint16_t>(nearest);
+    const double below = nearest > 0 ? lines[nearest] - lines[nearest - 1] : lines[1] - lines[0];
+    const double above = nearest + 1 < lines.size() ? lines[nearest + 1] - lines[nearest] : below;
+    const double reach = std::max(1.5, 0.25 * (at < lines[nearest] ? below : above));
+    if (std::abs(at - lines[nearest]) <= reach) near_points += histogram[bin];
+  }
+  constexpr double kShareNearLines = 0.8;  // 0.5 where elevations are spread evenly
+  if (near_points < kShareNearLines * static_cast<double>(scan.points.size())) return std::nullopt;
+  std::vector<std::uint16_t> labels(scan.points.size());
+  for (std::size_t i = 0; i < labels.size(); ++i) labels[i] = line_of_bin[bin_of[i]];
+  return number_by_elevation(scan, labels, lines.size(), RingSource::kElevation);
+}
+
+}  // namespace
+
+std::string to_string(RingSource source) {
+  switch (source) {
+    case RingSource::kFile: return "named by the file";
+    case RingSource::kOrder: return "recovered from the order of the points";
+    case RingSource::kElevation: return "recovered from elevation angles";
+    case RingSource::kNone: break;
+  }
+  return "none";
+}
+
+Rings find_rings(const Scan& scan) {
+  if (scan.rings.size() == scan.points.size() && !scan.rings.empty()) {
+    const auto largest = *std::max_element(scan.rings.begin(), scan.rings.end());
+    return number_by_elevation(scan, scan.rings, std::size_t{largest} + 1, RingSource::kFile);
+  }
+  if (scan.points.size() < kFewestPoints) return {};
+  if (auto rings = rings_from_elevation(scan)) return *std::move(rings);
+  if (auto rings = rings_from_order(scan)) return *std::move(rings);
+  return {};
+}
+
+}  // namespace revisit

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/registration/feature_alignment.hpp>
+
+#include <array>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include <revisit/registration/internal/features.hpp>
+
+namespace revisit {
+namespace {
+
+struct Match {
+  Eigen::Vector3d target, source;
+};
+
+// For each column of `a` the column of `b` that is nearest.
+std::vector<Eigen::Index> nearest_columns(const Eigen::MatrixXf& a, const Eigen::MatrixXf& b) {
+  std::vector<Eigen::Index> nearest(static_cast<std::size_t>(a.cols()));
+  const Eigen::VectorXf b_norms = b.colwise().squaredNorm();
+  constexpr Eigen::Index kBlock = 256;  // keeps the table of distances in the cache
+  for (Eigen::Index begin = 0; begin < a.cols(); begin += kBlock) {
+    const Eigen::Index count = std::min(kBlock, a.cols() - begin);
+    const Eigen::MatrixXf distances = (-2.f * (b.transpose() * a.middleCols(begin, count))).colwise() + b_norms;
+    for (Eigen::Index i = 0; i < count; ++i)
+      distances.col(i).minCoeff(&nearest[static_cast<std::size_t>(begin + i)]);
+  }
+  return nearest;
+}
+
+std::vector<Match> mutual_matches(const SurfaceCloud& target, const SurfaceCloud& source, double radius_m) {
+  const auto t = registration_internal::compute_fpfh(target, radius_m);
+  const auto s = registration_internal::compute_fpfh(source, radius_m);
+  std::vector<Match> matches;
+  if (t.points.empty() || s.points.empty()) return matches;
+  const auto to_target = nearest_columns(s.values, t.values), to_source = nearest_columns(t.values, s.values);
+  for (std::size_t i = 0; i < s.points.size(); ++i) {
+    const auto j = static_cast<std::size_t>(to_target[i]);
+    if (to_source[j] != static_cast<Eigen::Index>(i)) continue;
+    matches.push_back({target.point(t.points[j]).cast<double>(), source.point(s.points[i]).cast<double>()});
+  }
+  return matches;
+}
+
+Pose fit(const std::vector<Match>& matches, const std::vector<std::size_t>& chosen) {
+  Eigen::Matrix3Xd t(3, static_cast<Eigen::Index>(chosen.size())), s(3, static_cast<Eigen::Index>(chosen.size()));
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    t.col(static_cast<Eigen::Index>(i)) = matches[chosen[i]].target;
+    s.col(static_cast<Eigen::Index>(i)) = matches[chosen[i]].source;
+  }
+  return Pose(Eigen::umeyama(s, t, false));
+}
+
+std::vector<std::size_t> agreeing(const std::vector<Match>& matches, const Pose& T, double tolerance_m) {
+  std::vector<std::size_t> inliers;
+  for (std::size_t i = 0; i < matches.size(); ++i)
+    if ((T * matches[i].source - matches[i].target).squaredNorm() < tolerance_m * tolerance_m) inliers.push_back(i);
+  return inliers;
+}
+
+}  // namespace
+
+std::optional<FeatureAlignment> align_features(const SurfaceCloud& target, const SurfaceCloud& source,
+                                               double feature_radius_m) {
+  const std::vector<Match> matches = mutual_matches(target, source, feature_radius_m);
+  constexpr std::size_t kFewestInliers = 10;
+  if (matches.size() < kFewestInliers) return std::nullopt;
+  constexpr int kTrials = 20000;
+  constexpr double kTolerance_m = 1.0, kShortestSide_m = 3.0;
+  std::minstd_rand random(1);
+  std::vector<std::size_t> best;
+  std::vector<std::size_t> sample(3);
+  for (int trial = 0; trial < kTrials; ++trial) {
+    for (auto& each : sample) each = random() % matches.size();
+    // Rigid motion keeps lengths: most wrong samples end here, before anything is fitted.
+    bool plausible = true;
+    for (std::size_t i = 0; i < 3 && plausible; ++i) {
+      const Match &a = matches[sample[i]], &b = matches[sample[(i + 1) % 3]];
+      const double in_target = (a.target - b.target).norm(), in_source = (a.source - b.source).norm();
+      plausible = in_source > kShortestSide_m && std::abs(in_target - in_source) < kTolerance_m;
+    }
+    if (!plausible) continue;
+    auto inliers = agreeing(matches, fit(matches, sample), kTolerance_m);
+    if (inliers.size() > best.size()) best = std::move(inliers);
+  }
+  if (best.size() < kFewestInliers) return std::nullopt;
+  FeatureAlignment result;
+  result.matches = matches.size();
+  result.T_target_source = fit(matches, best);
+  result.inliers = agreeing(matches, result.T_target_source, kTolerance_m).size();
+  return result;
+}
+
+}  // namespace revisit

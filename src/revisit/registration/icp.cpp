@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/registration/icp.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+namespace revisit {
+namespace {
+
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+Pose small_motion(const Vector6& xi) {  // rotation first, then translation
+  Pose T = Pose::Identity();
+  const double angle = xi.head<3>().norm();
+  if (angle > 1e-12) T.linear() = Eigen::AngleAxisd(angle, xi.head<3>() / angle).toRotationMatrix();
+  T.translation() = xi.tail<3>();
+  return T;
+}
+
+// One Gauss-Newton step at kernel width `width_m`; false where the points do not fix the pose.
+bool step(const SurfaceCloud& target, const SurfaceCloud& source, double width_m, Pose& T, double& moved) {
+  Matrix6 H = Matrix6::Zero();
+  Vector6 g = Vector6::Zero();
+  const auto reach2 = static_cast<float>(width_m * width_m);
+  std::size_t pairs = 0;
+  for (std::size_t i = 0; i < source.size(); ++i) {
+    const Eigen::Vector3d p = T * source.point(i).cast<double>();
+    const auto neighbour = target.nearest(p.cast<float>());
+    if (neighbour.squared_distance_m2 > reach2) continue;
+    const Eigen::Vector3d n = target.normal(neighbour.index).cast<double>();
+    if (n.squaredNorm() < 0.5) continue;
+    const double residual = n.dot(p - target.point(neighbour.index).cast<double>());
+    Vector6 J;
+    J << p.cross(n), n;
+    const double shrink = width_m * width_m / 4.0;
+    const double weight = std::pow(shrink / (shrink + residual * residual), 2);
+    H += weight * J * J.transpose();
+    g += weight * residual * J;
+    ++pairs;
+  }
+  constexpr std::size_t kFewestPairs = 20;
+  if (pairs < kFewestPairs) return false;
+  H.diagonal().array() += 1e-6 * H.diagonal().maxCoeff();  // a direction that nothing sees stays where it was
+  const Vector6 xi = H.ldlt().solve(-g);
+  if (!xi.allFinite()) return false;
+  T = small_motion(xi) * T;
+  moved = xi.head<3>().norm() * 20.0 + xi.tail<3>().norm();  // metres, of a point 20 m away
+  return true;
+}
+
+struct DirectionalAgreement {
+  std::size_t visible = 0, inliers = 0;
+  double squared_sum = 0.0;
+};
+
+// The share of the points above ground of `from` that lie on a surface of `to`.
+DirectionalAgreement agreement_one_way(const SurfaceCloud& to, const SurfaceCloud& from, const Pose& T_to_from,
+                                       double inlier_distance_m, double farthest_m) {
+  DirectionalAgreement result;
+  constexpr double kReach = 2.5;  // in-plane distance to the nearest centroid, in inlier distances
+  const double reach2 = std::pow(kReach * inlier_distance_m, 2);
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    if (from.is_ground(i)) continue;
+    const Eigen::Vector3d p = T_to_from * from.point(i).cast<double>();
+    if (p.norm() > farthest_m) continue;
+    ++result.visible;
+    const auto neighbour = to.nearest(p.cast<float>());
+    if (static_cast<double>(neighbour.squared_distance_m2) > reach2) continue;
+    const Eigen::Vector3d n = to.normal(neighbour.index).cast<double>();
+    const Eigen::Vector3d d = p - to.point(neighbour.index).cast<double>();
+    const double distance = n.squaredNorm() < 0.5 ? d.norm() : std::abs(n.dot(d));
+    if (distance > inlier_distance_m) continue;
+    ++result.inliers;
+    result.squared_sum += distance * distance;
+  }
+  return result;
+}
+
+double range_that_holds_most(const SurfaceCloud& cloud) {
+  std::vector<float> ranges;
+  for (std::size_t i = 0; i < cloud.size(); ++i)
+    if (!cloud.is_ground(i)) ranges.push_back(cloud.point(i).norm());
+  if (ranges.empty()) return 0.0;
+  const auto rank = ranges.begin() + static_cast<std::ptrdiff_t>(static_cast<double>(ranges.size() - 1) * 0.95);
+  std::nth_element(ranges.begin(), rank, ranges.end());
+  return static_cast<double>(*rank);
+}
+
+}  // namespace
+
+IcpResult align_icp(const SurfaceCloud& target, const SurfaceCloud& source, const Pose& T_guess_target_source,
+                    double coarse_m, double fine_m) {
+  IcpResult result;
+  result.T_target_source = T_guess_target_source;
+  if (target.size() == 0 || source.size() == 0) return result;
+  constexpr int kMostIterations = 60;
+  constexpr double kShrink = 0.8, kSettled_m = 2e-4;
+  double width_m = coarse_m;
+  for (; result.iterations < kMostIterations; ++result.iterations) {
+    double moved = 0.0;
+    if (!step(target, source, width_m, result.T_target_source, moved)) return result;
+    const bool fine = width_m <= fine_m;
+    if (fine && moved < kSettled_m) {
+      result.converged = true;
+      break;
+    }
+    width_m = std::max(fine_m, width_m * kShrink);
+  }
+  return result;
+}
+
+Agreement measure_agreement(const SurfaceCloud& target, const SurfaceCloud& source, const Pose& T_target_source,
+                            double inlier_distance_m) {
+  const double target_range = range_that_holds_most(target), source_range = range_that_holds_most(source);
+  const auto forth = agreement_one_way(target, source, T_target_source, inlier_distance_m, target_range);
+  const auto back = agreement_one_way(source, target, T_target_source.inverse(), inlier_distance_m, source_range);
+  const auto ratio = [](const DirectionalAgreement& a) {
+    constexpr std::size_t kFewestPoints = 50;  // of fewer, nothing can be said
+    return a.visible < kFewestPoints ? 0.0 : static_cast<double>(a.inliers) / static_cast<double>(a.visible);
+  };
+  Agreement result;
+  result.inlier_ratio = std::min(ratio(forth), ratio(back));
+  const std::size_t inliers = forth.inliers + back.inliers;
+  if (inliers > 0) result.rmse_m = std::sqrt((forth.squared_sum + back.squared_sum) / static_cast<double>(inliers));
+  return result;
+}
+
+}  // namespace revisit

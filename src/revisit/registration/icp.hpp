@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <revisit/core/pose.hpp>
+#include <revisit/registration/surface_cloud.hpp>
+
+namespace revisit {
+
+struct IcpResult {
+  Pose T_target_source = Pose::Identity();
+  bool converged = false;
+  int iterations = 0;
+};
+
+/// Point-to-plane ICP with a Geman-McClure kernel whose width shrinks from `coarse_m` to `fine_m`: from a guess a few
+/// metres and some ten degrees off to the nearest optimum. Deterministic.
+IcpResult align_icp(const SurfaceCloud& target, const SurfaceCloud& source, const Pose& T_guess_target_source,
+                    double coarse_m = 4.0, double fine_m = 0.5);
+
+/// How well a relative pose explains both scans.
+struct Agreement {
+  double inlier_ratio = 0.0;  ///< smaller of both directions: share of the points above ground with a surface within
+                              ///< reach, among those that the other scan could have seen
+  double rmse_m = 0.0;        ///< point-to-plane, over the inliers above ground of both directions
+};
+Agreement measure_agreement(const SurfaceCloud& target, const SurfaceCloud& source, const Pose& T_target_source,
+                            double inlier_distance_m);
+
+}  // namespace revisit

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <revisit/core/scan.hpp>
+
+namespace revisit {
+
+/// A scan thinned to one point a voxel: small enough to keep for every place.
+struct ThinCloud {
+  std::vector<Eigen::Vector3f> points;   ///< centroids of the voxels, metres, LiDAR frame; in an order that depends on
+                                         ///< the points alone
+  std::vector<std::uint8_t> is_ground;   ///< one a point: most of its voxel lay on the ground
+};
+
+/// Thins `points` with cubic voxels of `voxel_m`. `is_ground` has one entry a point or is empty (nothing is ground).
+ThinCloud thin(std::span<const Point> points, std::span<const std::uint8_t> is_ground, double voxel_m);
+
+/// A thin cloud with what registration needs of it: normals and a search tree. Safe to share between threads.
+class SurfaceCloud {
+ public:
+  explicit SurfaceCloud(ThinCloud cloud);
+  ~SurfaceCloud();
+  SurfaceCloud(SurfaceCloud&&) noexcept;
+  SurfaceCloud& operator=(SurfaceCloud&&) noexcept;
+
+  std::size_t size() const { return cloud_.points.size(); }
+  const Eigen::Vector3f& point(std::size_t i) const { return cloud_.points[i]; }
+  /// Unit normal, sign arbitrary; zero where fewer than five neighbours gave none.
+  const Eigen::Vector3f& normal(std::size_t i) const { return normals_[i]; }
+  bool is_ground(std::size_t i) const { return cloud_.is_ground[i] != 0; }
+
+  /// The nearest point and its squared distance; of an empty cloud, the distance is infinite.
+  struct Neighbour {
+    std::size_t index = 0;
+    float squared_distance_m2 = 0.f;
+  };
+  Neighbour nearest(const Eigen::Vector3f& query) const;
+  /// Up to `k` nearest points, nearest first.
+  std::vector<Neighbour> nearest(const Eigen::Vector3f& query, std::size_t k) const;
+
+ private:
+  struct Tree;
+  ThinCloud cloud_;
+  std::vector<Eigen::Vector3f> normals_;
+  std::unique_ptr<Tree> tree_;
+};
+
+}  // namespace revisit

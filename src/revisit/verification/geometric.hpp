@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include <revisit/config/parameters.hpp>
+#include <revisit/core/loop.hpp>
+#include <revisit/registration/surface_cloud.hpp>
+
+namespace revisit {
+
+/// What registration says about a candidate.
+struct GeometricEvidence {
+  Pose T_match_query = Pose::Identity();  ///< best registration found, accepted or not
+  double inlier_ratio = 0.0;              ///< smaller of both directions
+  double rmse_m = 0.0;
+  int icp_iterations = 0;
+  std::size_t feature_matches = 0, feature_inliers = 0;  ///< FPFH; 0 where it found no transform
+  bool from_features = false;  ///< ICP started from FPFH's transform, not from the descriptor's yaw
+  bool consistent = false;
+  std::string reason;          ///< why not consistent
+};
+
+/// Geometric consistency (paper, section III-D): registers the query onto the match from FPFH's transform and from the
+/// yaw that the descriptors agreed on, keeps the better, and judges it. Deterministic; safe from several threads.
+GeometricEvidence check_geometric(const SurfaceCloud& match, const SurfaceCloud& query, double yaw_rad,
+                                  const GeometricOptions& options);
+
+}  // namespace revisit
