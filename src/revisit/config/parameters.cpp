@@ -134,14 +134,14 @@ std::vector<ParameterInfo> parameter_infos() {
   return infos;
 }
 
-std::vector<std::string> preset_names() { return {"default", "paper", "grid20x60", "grid60x20"}; }
+std::vector<std::string> preset_names() { return {"default", "paper", "grid20x60"}; }
 
 Result<Parameters> preset(std::string_view name) {
   Parameters p;
   if (name == "default") return p;
-  if (name == "grid20x60" || name == "grid60x20") {
-    p.descriptor.rings = name == "grid20x60" ? 20 : 60;
-    p.descriptor.sectors = name == "grid20x60" ? 60 : 20;
+  if (name == "grid20x60") {
+    p.descriptor.rings = 20;
+    p.descriptor.sectors = 60;
     return p;
   }
   if (name == "paper") {  // table I of the paper, to the letter

@@ -21,13 +21,13 @@ struct PreprocessOptions {
 /// How raw intensity becomes [0, 1], decided once a recording.
 struct IntensityOptions {
   double full_scale = 0.0;          ///< reading that becomes 1; 0 = the quantile below, found from the recording
-  double full_scale_quantile = 0.995;  ///< share of readings at or below full scale
+  double full_scale_quantile = 0.98;  ///< share of readings at or below full scale
 };
 
 /// The polar grid of intensity scan context (paper, section III-B).
 struct DescriptorOptions {
-  int rings = 20;              ///< N_r, radial bins
-  int sectors = 60;            ///< N_s, azimuthal bins
+  int rings = 60;              ///< N_r, radial bins
+  int sectors = 20;            ///< N_s, azimuthal bins
   double max_range_m = 50.0;   ///< L_max
   int min_occupied_cells = 12; ///< fewer occupied cells describe no place
 };
@@ -50,7 +50,7 @@ struct TemporalOptions {
 
 /// Geometric consistency: FPFH, then ICP (paper, section III-D).
 struct GeometricOptions {
-  double voxel_m = 0.7;            ///< edge of the voxels that thin a scan
+  double voxel_m = 1.0;            ///< edge of the voxels that thin a scan
   int candidates = 3;              ///< how many of the top-K are registered, best first
   double min_descriptor_score = 1.0;  ///< candidates with a lower Phi_g + Phi_i are not registered
   double feature_radius_m = 3.0;   ///< neighbourhood of FPFH features
@@ -82,7 +82,7 @@ struct ParameterInfo {
 /// All parameters in the order of the reference page.
 std::vector<ParameterInfo> parameter_infos();
 
-/// "default", "paper", "grid20x60", "grid60x20".
+/// "default", "paper" (its printed thresholds, to the letter), "grid20x60" (the authors' program's grid).
 std::vector<std::string> preset_names();
 Result<Parameters> preset(std::string_view name);
 

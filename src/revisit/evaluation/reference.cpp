@@ -2,12 +2,14 @@
 #include <revisit/evaluation/reference.hpp>
 
 #include <algorithm>
+#include <cmath>
 
 namespace revisit {
 
 Reference::Reference(Trajectory trajectory, const EvaluationRules& rules)
     : trajectory_(std::move(trajectory)), rules_(rules) {
   constexpr double kTimeTolerance_s = 1e-6;
+  const double reverse_cosine = std::cos(to_radians(rules_.reverse_heading_deg));
   for (const auto& [query, at] : trajectory_.entries) {
     std::optional<Revisit> nearest;
     for (const auto& [frame, other] : trajectory_.entries) {
@@ -16,7 +18,7 @@ Reference::Reference(Trajectory trajectory, const EvaluationRules& rules)
       const double distance = (at.T_world_lidar.translation() - other.T_world_lidar.translation()).norm();
       if (distance > rules_.same_place_m || (nearest && distance >= nearest->distance_m)) continue;
       const Eigen::Vector3d heading = at.T_world_lidar.linear().col(0), then = other.T_world_lidar.linear().col(0);
-      nearest = Revisit{frame, distance, heading.dot(then) < 0.0};
+      nearest = Revisit{frame, distance, heading.dot(then) < reverse_cosine};
     }
     if (nearest) revisits_[query] = *nearest;
   }

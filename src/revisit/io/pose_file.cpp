@@ -42,6 +42,13 @@ std::optional<Pose> from_quaternion(const double* v) {  // x y z qx qy qz qw
   return orthonormal(q.normalized().toRotationMatrix(), t);
 }
 
+// What is wrong with a pose of seven numbers, for the message.
+std::string quaternion_fault(const double* v) {
+  const double norm = std::sqrt(v[3] * v[3] + v[4] * v[4] + v[5] * v[5] + v[6] * v[6]);
+  return "not a rigid transform: a quaternion of norm " + std::to_string(norm) +
+         "; allowed: 1 (does the row hold roll, pitch, yaw instead?)";
+}
+
 Error bad_row(const std::filesystem::path& file, std::size_t line, const std::string& what) {
   return {file.string() + ":" + std::to_string(line) + ": " + what};
 }
@@ -71,7 +78,7 @@ Result<PoseFile> from_rows(const std::filesystem::path& file, const std::vector<
       row.frame = FrameId{static_cast<std::int64_t>(frame)};
       pose = from_matrix_row(v.data() + (width - 12));
     }
-    if (!pose) return bad_row(file, rows[i].line, "not a rigid transform");
+    if (!pose) return bad_row(file, rows[i].line, width == 8 ? quaternion_fault(v.data() + 1) : "not a rigid transform");
     row.T_world_body = *pose;
     poses.rows.push_back(row);
   }
@@ -89,8 +96,10 @@ Result<PoseFile> from_g2o(const std::filesystem::path& file, const std::string& 
     const auto values = io_internal::parse_numbers(line.substr(kVertex.size()));
     if (!values || values->size() != 8)
       return bad_row(file, line_number, "a vertex needs 8 numbers: id x y z qx qy qz qw");
+    const double id = (*values)[0];
+    if (!(id >= 0.0 && id < 1e15)) return bad_row(file, line_number, std::to_string(id) + " is no vertex number");
     const auto pose = from_quaternion(values->data() + 1);
-    if (!pose || !((*values)[0] >= 0.0 && (*values)[0] < 1e15)) return bad_row(file, line_number, "not a rigid transform");
+    if (!pose) return bad_row(file, line_number, quaternion_fault(values->data() + 1));
     poses.rows.push_back({FrameId{static_cast<std::int64_t>((*values)[0])}, std::nullopt, *pose});
   }
   return poses;

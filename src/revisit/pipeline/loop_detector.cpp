@@ -102,7 +102,7 @@ void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
     return found == recent_queries_.end() ? nullptr : &found->second;
   };
   const auto match_descriptor = [&](FrameId frame) { return index_.find(frame); };
-  std::optional<SurfaceCloud> query_cloud;
+  std::optional<ScanGeometry> query;
   const auto count = std::min(detection.candidates.size(), static_cast<std::size_t>(parameters_.geometric.candidates));
   for (std::size_t i = 0; i < count; ++i) {
     const LoopCandidate& candidate = detection.candidates[i];
@@ -120,9 +120,9 @@ void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
     } else if (!temporal.consistent) {
       reason = temporal.reason;
     } else {
-      if (!query_cloud) query_cloud.emplace(prepared.cloud);
-      geometric = check_geometric(SurfaceCloud(places_.at(candidate.match).cloud), *query_cloud, candidate.yaw_rad,
-                                  parameters_.geometric);
+      if (!query) query.emplace(prepared.cloud);
+      ScanGeometry match(places_.at(candidate.match).cloud);
+      geometric = check_geometric(match, *query, candidate.yaw_rad, parameters_.geometric);
       detection.geometric_ms += watch.lap_ms();
       reason = geometric->reason;
     }

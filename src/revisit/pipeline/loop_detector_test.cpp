@@ -1,1 +1,131 @@
-#include <gtest/gtest.h>
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/pipeline/loop_detector.hpp>
+
+#include <stdexcept>
+
+#include "shared_data.hpp"
+#include "synthetic_world.hpp"
+
+namespace revisit {
+namespace {
+
+using testing_support::shared_data;
+using testing_support::SyntheticWorld;
+
+const SyntheticWorld::Sensor kSensor{32, 900, -24.8, 5.0};
+
+Scan scan_at(const SyntheticWorld& world, int frame, const Pose& T, unsigned seed) {
+  Scan scan = world.scan(T, kSensor, seed);
+  scan.frame = FrameId{frame};
+  scan.stamp_s = 0.1 * frame;
+  return scan;
+}
+
+// Out along x through a street, and a long time later one scan on the way back.
+TEST(LoopDetector, FindsThePlaceAndThePoseOfAReverseVisit) {
+  const SyntheticWorld world(51);
+  LoopDetector detector{Parameters{}};
+  for (int i = 0; i < 8; ++i) {
+    const auto detection = detector.process(scan_at(world, i, SyntheticWorld::at(-28.0 + 8.0 * i, 0, 0), static_cast<unsigned>(i)));
+    ASSERT_TRUE(detection) << detection.error().message;
+    EXPECT_FALSE(detection->had_searchable_past);
+    EXPECT_EQ(detection->reason, "no searchable past");
+  }
+  const Pose T_query = SyntheticWorld::at(5.0, 1.0, to_radians(176.0));
+  const auto detection = detector.process(scan_at(world, 1000, T_query, 99), T_query);
+  ASSERT_TRUE(detection);
+  ASSERT_TRUE(detection->loop) << detection->reason;
+  EXPECT_EQ(detection->loop->match.value, 4) << "the place at x = 4";
+  const Pose error = (SyntheticWorld::at(4.0, 0, 0).inverse() * T_query).inverse() * detection->loop->T_match_query;
+  EXPECT_LT(error.translation().norm(), 0.15);
+  EXPECT_LT(to_degrees(rotation_angle(error)), 0.5);
+  EXPECT_GT(detection->score, 1.0);
+  EXPECT_EQ(detection->row().match->value, 4);
+  EXPECT_TRUE(detection->row().accepted);
+  EXPECT_FALSE(detection->T_match_query_by_odometry) << "the match came without a pose";
+}
+
+TEST(LoopDetector, TheFirstPlaceCanBeRecognised) {
+  const SyntheticWorld world(52);
+  LoopDetector detector{Parameters{}};
+  ASSERT_TRUE(detector.process(scan_at(world, 0, SyntheticWorld::at(0, 0, 0), 1), Pose::Identity()));
+  Pose drifted = Pose::Identity();
+  drifted.translation().x() = 100.0;
+  const auto detection = detector.process(scan_at(world, 1000, SyntheticWorld::at(0.5, 0, 0), 2), drifted);
+  ASSERT_TRUE(detection && detection->loop);
+  EXPECT_EQ(detection->loop->match.value, 0);
+  EXPECT_NEAR(detection->T_match_query_by_odometry->translation().x(), 100.0, 1e-9) << "evidence, not a gate";
+}
+
+TEST(LoopDetector, AnotherTownIsRefusedAndSaysWhy) {
+  LoopDetector detector{Parameters{}};
+  const SyntheticWorld home(53), away(54);
+  for (int i = 0; i < 5; ++i)
+    ASSERT_TRUE(detector.add(scan_at(home, i, SyntheticWorld::at(6.0 * i, 0, 0), static_cast<unsigned>(i))));
+  const auto detection = detector.localise(scan_at(away, 0, SyntheticWorld::at(0, 0, 0), 7));
+  ASSERT_TRUE(detection);
+  EXPECT_FALSE(detection->loop);
+  EXPECT_FALSE(detection->reason.empty());
+  EXPECT_TRUE(detection->answer) << "what it looked like is told all the same";
+  const auto back_home = detector.localise(scan_at(home, 0, SyntheticWorld::at(12.5, 0.5, 0), 8));
+  ASSERT_TRUE(back_home && back_home->loop);
+  EXPECT_EQ(back_home->loop->match.value, 2);
+  EXPECT_EQ(detector.index().size(), 5u) << "localise adds nothing";
+}
+
+TEST(LoopDetector, AScanOfNoUseLeavesTheRestAlone) {
+  const SyntheticWorld world(55);
+  LoopDetector detector{Parameters{}};
+  ASSERT_TRUE(detector.process(scan_at(world, 0, SyntheticWorld::at(0, 0, 0), 1)));
+  Scan broken;
+  broken.frame = FrameId{1};
+  EXPECT_FALSE(detector.process(broken));
+  EXPECT_TRUE(detector.process(scan_at(world, 2, SyntheticWorld::at(1, 0, 0), 2)));
+  EXPECT_EQ(detector.index().size(), 2u);
+}
+
+TEST(LoopDetector, ParametersOutOfRangeThrow) {
+  Parameters parameters;
+  parameters.retrieval.top_k = 0;
+  EXPECT_THROW(LoopDetector{parameters}, std::invalid_argument);
+}
+
+struct Outcome {
+  std::map<std::int64_t, Detection> loops;
+};
+
+Outcome run(const std::filesystem::path& folder, const Parameters& parameters, const std::filesystem::path& database = {}) {
+  const auto recording = open_recording(folder);
+  const auto map = open_recording(database.empty() ? folder : database);
+  LoopDetector detector(parameters, *estimate_intensity_scale(**map, parameters));
+  for (std::size_t i = 0; !database.empty() && i < (*map)->size(); i += 6) EXPECT_TRUE(detector.add(*(*map)->read(i)));
+  Outcome outcome;
+  for (std::size_t i = 0; i < (*recording)->size(); ++i) {
+    auto scan = (*recording)->read(i);
+    const auto detection = database.empty() ? detector.process(*std::move(scan)) : detector.localise(*std::move(scan));
+    EXPECT_TRUE(detection) << detection.error().message;
+    if (detection && detection->loop) outcome.loops[detection->frame.value] = *detection;
+  }
+  return outcome;
+}
+
+TEST(LoopDetectorOnRealScans, TheOneRevisitAndNoOther) {
+  REVISIT_NEEDS_SHARED_DATA();
+  const auto outcome = run(shared_data() / "kitti00_mini", {});
+  ASSERT_EQ(outcome.loops.size(), 1u);
+  const Detection& detection = outcome.loops.at(4501);
+  EXPECT_EQ(detection.candidates[0].match.value, 52) << "top-1";
+  const auto recording = open_recording(shared_data() / "kitti00_mini");
+  const Trajectory& truth = (*recording)->trajectory();
+  const Pose error = (truth.at(FrameId{52})->inverse() * *truth.at(FrameId{4501})).inverse() * detection.loop->T_match_query;
+  EXPECT_LT(error.translation().norm(), 0.3);
+  EXPECT_LT(to_degrees(rotation_angle(error)), 1.0);
+}
+
+TEST(LoopDetectorOnRealScans, NoLoopWhereNoneIs) {
+  REVISIT_NEEDS_SHARED_DATA();
+  EXPECT_TRUE(run(shared_data() / "kitti_raw_0005", {}).loops.empty());
+}
+
+}  // namespace
+}  // namespace revisit

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/registration/feature_alignment.hpp>
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
 
 #include <Eigen/Geometry>
 
-#include <revisit/registration/internal/features.hpp>
 
 namespace revisit {
 namespace {
@@ -31,9 +30,8 @@ std::vector<Eigen::Index> nearest_columns(const Eigen::MatrixXf& a, const Eigen:
   return nearest;
 }
 
-std::vector<Match> mutual_matches(const SurfaceCloud& target, const SurfaceCloud& source, double radius_m) {
-  const auto t = registration_internal::compute_fpfh(target, radius_m);
-  const auto s = registration_internal::compute_fpfh(source, radius_m);
+std::vector<Match> mutual_matches(const SurfaceCloud& target, const Features& t, const SurfaceCloud& source,
+                                  const Features& s) {
   std::vector<Match> matches;
   if (t.points.empty() || s.points.empty()) return matches;
   const auto to_target = nearest_columns(s.values, t.values), to_source = nearest_columns(t.values, s.values);
@@ -63,9 +61,9 @@ std::vector<std::size_t> agreeing(const std::vector<Match>& matches, const Pose&
 
 }  // namespace
 
-std::optional<FeatureAlignment> align_features(const SurfaceCloud& target, const SurfaceCloud& source,
-                                               double feature_radius_m) {
-  const std::vector<Match> matches = mutual_matches(target, source, feature_radius_m);
+std::optional<FeatureAlignment> align_features(const SurfaceCloud& target, const Features& target_features,
+                                               const SurfaceCloud& source, const Features& source_features) {
+  const std::vector<Match> matches = mutual_matches(target, target_features, source, source_features);
   constexpr std::size_t kFewestInliers = 10;
   if (matches.size() < kFewestInliers) return std::nullopt;
   constexpr int kTrials = 20000;

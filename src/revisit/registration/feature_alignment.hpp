@@ -3,6 +3,9 @@
 
 #include <cstddef>
 #include <optional>
+#include <vector>
+
+#include <Eigen/Core>
 
 #include <revisit/core/pose.hpp>
 #include <revisit/registration/surface_cloud.hpp>
@@ -15,10 +18,34 @@ struct FeatureAlignment {
   std::size_t inliers = 0;  ///< of them, in agreement with the transform
 };
 
+/// FPFH features of the points above ground, one column of 33 numbers a point.
+struct Features {
+  std::vector<std::size_t> points;  ///< indices into the cloud
+  Eigen::MatrixXf values;           ///< 33 x points
+};
+Features compute_features(const SurfaceCloud& cloud, double radius_m);
+
 /// A first rigid transform without any guess (paper, section III-D): FPFH features of the points above ground, mutual
 /// nearest neighbours, and the rigid transform that most of them agree on (RANSAC, fixed seed: deterministic).
 /// Nothing where fewer than ten matches agree.
-std::optional<FeatureAlignment> align_features(const SurfaceCloud& target, const SurfaceCloud& source,
-                                               double feature_radius_m);
+std::optional<FeatureAlignment> align_features(const SurfaceCloud& target, const Features& target_features,
+                                               const SurfaceCloud& source, const Features& source_features);
+
+/// A scan as registration meets it: its surface, and its features as soon as somebody asks for them.
+/// One thread at a time.
+class ScanGeometry {
+ public:
+  explicit ScanGeometry(ThinCloud cloud) : surface_(std::move(cloud)) {}
+  const SurfaceCloud& surface() const { return surface_; }
+  /// Computed on the first call, with that call's radius.
+  const Features& features(double radius_m) {
+    if (!features_) features_ = compute_features(surface_, radius_m);
+    return *features_;
+  }
+
+ private:
+  SurfaceCloud surface_;
+  std::optional<Features> features_;
+};
 
 }  // namespace revisit

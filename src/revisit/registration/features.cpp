@@ -5,11 +5,11 @@
 #include <pcl/point_types.h>
 #include <pcl/search/kdtree.h>
 
-#include <revisit/registration/internal/features.hpp>
+#include <revisit/registration/feature_alignment.hpp>
 
-namespace revisit::registration_internal {
+namespace revisit {
 
-Features compute_fpfh(const SurfaceCloud& cloud, double radius_m) {
+Features compute_features(const SurfaceCloud& cloud, double radius_m) {
   pcl::PointCloud<pcl::PointXYZ>::Ptr points(new pcl::PointCloud<pcl::PointXYZ>);
   pcl::PointCloud<pcl::Normal>::Ptr normals(new pcl::PointCloud<pcl::Normal>);
   Features features;
@@ -43,4 +43,4 @@ Features compute_fpfh(const SurfaceCloud& cloud, double radius_m) {
   return features;
 }
 
-}  // namespace revisit::registration_internal
+}  // namespace revisit

@@ -97,8 +97,8 @@ IcpResult align_icp(const SurfaceCloud& target, const SurfaceCloud& source, cons
   IcpResult result;
   result.T_target_source = T_guess_target_source;
   if (target.size() == 0 || source.size() == 0) return result;
-  constexpr int kMostIterations = 60;
-  constexpr double kShrink = 0.8, kSettled_m = 2e-4;
+  constexpr int kMostIterations = 100;
+  constexpr double kShrink = 0.7, kSteady = 0.03, kSettled_m = 2e-4;
   double width_m = coarse_m;
   for (; result.iterations < kMostIterations; ++result.iterations) {
     double moved = 0.0;
@@ -108,7 +108,7 @@ IcpResult align_icp(const SurfaceCloud& target, const SurfaceCloud& source, cons
       result.converged = true;
       break;
     }
-    width_m = std::max(fine_m, width_m * kShrink);
+    if (moved < kSteady * width_m) width_m = std::max(fine_m, width_m * kShrink);
   }
   return result;
 }

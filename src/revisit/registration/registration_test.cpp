@@ -1,1 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
+
+#include <pcl/point_types.h>
+#include <pcl/registration/icp.h>
+
+#include <revisit/registration/feature_alignment.hpp>
+#include <revisit/registration/icp.hpp>
+
+#include "synthetic_world.hpp"
+
+namespace revisit {
+namespace {
+
+using testing_support::SyntheticWorld;
+
+ThinCloud thin_scan(const Pose& T_world_lidar, unsigned seed = 1) {
+  const SyntheticWorld world(31);
+  const Scan scan = world.scan(T_world_lidar, {32, 900, -24.8, 5.0}, seed);
+  std::vector<std::uint8_t> ground;
+  for (const Point& p : scan.points) ground.push_back(p.z < -1.6f);
+  return thin(scan.points, ground, 1.0);
+}
+
+double error_m(const Pose& T, const Pose& T_truth) { return (T_truth.inverse() * T).translation().norm(); }
+double error_deg(const Pose& T, const Pose& T_truth) { return to_degrees(rotation_angle(T_truth.inverse() * T)); }
+
+TEST(Thin, OnePointAVoxelWhateverTheOrder) {
+  const std::vector<Point> points = {{0.1f, 0.1f, 0.1f, 0}, {0.3f, 0.1f, 0.1f, 0}, {1.5f, 0.f, 0.f, 0}, {-0.1f, 0.f, 0.f, 0}};
+  const ThinCloud cloud = thin(points, std::vector<std::uint8_t>{1, 1, 0, 0}, 1.0);
+  EXPECT_EQ(cloud.points.size(), 3u);
+  std::vector<Point> reversed(points.rbegin(), points.rend());
+  const ThinCloud again = thin(reversed, {}, 1.0);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_LT((cloud.points[i] - again.points[i]).norm(), 1e-6f);
+  EXPECT_EQ(cloud.is_ground[1], 1) << "both points of the voxel are ground";
+  EXPECT_TRUE(thin({}, {}, 1.0).points.empty());
+}
+
+TEST(SurfaceCloud, NormalsOfAPlane) {
+  ThinCloud plane;
+  for (int i = 0; i < 20; ++i)
+    for (int j = 0; j < 20; ++j) plane.points.emplace_back(static_cast<float>(i), static_cast<float>(j), 0.5f * static_cast<float>(i));
+  const SurfaceCloud cloud(plane);
+  const Eigen::Vector3f expected = Eigen::Vector3f(-0.5f, 0.f, 1.f).normalized();
+  for (std::size_t i = 0; i < cloud.size(); ++i) EXPECT_NEAR(std::abs(cloud.normal(i).dot(expected)), 1.f, 1e-3f);
+  EXPECT_EQ(cloud.nearest(Eigen::Vector3f(3.2f, 4.1f, 1.5f)).index, 3u * 20u + 4u);
+}
+
+TEST(Icp, FindsAKnownMotionFromMetresAway) {
+  const Pose T_a = SyntheticWorld::at(0, 0, 0), T_b = SyntheticWorld::at(2.5, 0.8, to_radians(8.0));
+  const SurfaceCloud a(thin_scan(T_a)), b(thin_scan(T_b, 2));
+  const Pose T_truth = T_a.inverse() * T_b;
+  const IcpResult result = align_icp(a, b, Pose::Identity());
+  EXPECT_TRUE(result.converged);
+  EXPECT_LT(error_m(result.T_target_source, T_truth), 0.05);
+  EXPECT_LT(error_deg(result.T_target_source, T_truth), 0.2);
+  EXPECT_GT(measure_agreement(a, b, result.T_target_source, 0.4).inlier_ratio, 0.7);
+}
+
+TEST(Icp, AgreesWithPclFromNearby) {
+  const Pose T_a = SyntheticWorld::at(0, 0, 0), T_b = SyntheticWorld::at(0.3, 0.1, to_radians(1.0));
+  const SurfaceCloud a(thin_scan(T_a)), b(thin_scan(T_b, 2));
+  pcl::PointCloud<pcl::PointNormal>::Ptr pa(new pcl::PointCloud<pcl::PointNormal>), pb(new pcl::PointCloud<pcl::PointNormal>);
+  for (const auto& [cloud, target] : {std::pair{&a, pa}, {&b, pb}})
+    for (std::size_t i = 0; i < cloud->size(); ++i) {
+      if (cloud->normal(i).squaredNorm() < 0.5f) continue;
+      pcl::PointNormal p;
+      p.getVector3fMap() = cloud->point(i);
+      p.getNormalVector3fMap() = cloud->normal(i);
+      target->push_back(p);
+    }
+  pcl::IterativeClosestPointWithNormals<pcl::PointNormal, pcl::PointNormal> oracle;
+  oracle.setInputTarget(pa);
+  oracle.setInputSource(pb);
+  oracle.setMaxCorrespondenceDistance(0.5);
+  oracle.setMaximumIterations(50);
+  pcl::PointCloud<pcl::PointNormal> unused;
+  oracle.align(unused);
+  const Pose T_oracle(oracle.getFinalTransformation().cast<double>());
+  const Pose T = align_icp(a, b, Pose::Identity(), 1.0, 0.5).T_target_source;
+  EXPECT_LT(error_m(T, T_oracle), 0.05);
+  EXPECT_LT(error_deg(T, T_oracle), 0.2);
+}
+
+TEST(Icp, OfAScanWithItselfIsTheIdentity) {
+  const SurfaceCloud a(thin_scan(SyntheticWorld::at(0, 0, 0)));
+  const IcpResult result = align_icp(a, a, Pose::Identity());
+  EXPECT_TRUE(result.converged);
+  EXPECT_LT(error_m(result.T_target_source, Pose::Identity()), 1e-6);
+  const Agreement agreement = measure_agreement(a, a, Pose::Identity(), 0.4);
+  EXPECT_DOUBLE_EQ(agreement.inlier_ratio, 1.0);
+  EXPECT_NEAR(agreement.rmse_m, 0.0, 1e-9);
+}
+
+TEST(Icp, TooLittleToAlignDoesNotConverge) {
+  const SurfaceCloud a(thin_scan(SyntheticWorld::at(0, 0, 0)));
+  const SurfaceCloud nothing(ThinCloud{}), one(ThinCloud{{Eigen::Vector3f(1, 2, 3)}, {0}});
+  for (const SurfaceCloud* each : {&nothing, &one}) {
+    EXPECT_FALSE(align_icp(a, *each, Pose::Identity()).converged);
+    EXPECT_FALSE(align_icp(*each, a, Pose::Identity()).converged);
+    EXPECT_EQ(measure_agreement(a, *each, Pose::Identity(), 0.4).inlier_ratio, 0.0);
+  }
+}
+
+TEST(Features, FindATurnWithoutAnyGuess) {
+  const Pose T_a = SyntheticWorld::at(0, 0, 0), T_b = SyntheticWorld::at(1.5, -0.5, to_radians(140.0));
+  const SurfaceCloud a(thin_scan(T_a)), b(thin_scan(T_b, 2));
+  const auto result = align_features(a, compute_features(a, 3.0), b, compute_features(b, 3.0));
+  ASSERT_TRUE(result);
+  const Pose T_truth = T_a.inverse() * T_b;
+  EXPECT_LT(error_m(result->T_target_source, T_truth), 1.5);
+  EXPECT_LT(error_deg(result->T_target_source, T_truth), 5.0);
+  const SurfaceCloud nothing(ThinCloud{});
+  EXPECT_FALSE(align_features(a, compute_features(a, 3.0), nothing, compute_features(nothing, 3.0)));
+}
+
+}  // namespace
+}  // namespace revisit

@@ -1,1 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/retrieval/place_index.hpp>
+
+#include <algorithm>
+#include <random>
+#include <stdexcept>
+
 #include <gtest/gtest.h>
+
+#include <revisit/descriptors/similarity.hpp>
+
+namespace revisit {
+namespace {
+
+IntensityScanContext random_context(unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<float> at(0.f, 20.f);
+  std::uniform_real_distribution<float> reading(0.f, 1.f);
+  std::vector<Point> points(600);
+  for (Point& p : points) p = {at(random), at(random), 0.f, reading(random)};
+  return describe(points, {});
+}
+
+PlaceIndex filled(const RetrievalOptions& options, int places) {
+  PlaceIndex index(options);
+  for (int i = 0; i < places; ++i) index.add(FrameId{i}, 0.1 * i, random_context(static_cast<unsigned>(i)));
+  return index;
+}
+
+TEST(PlaceIndex, ExcludesTheRecentPastByFramesAndByTime) {
+  RetrievalOptions options;
+  options.exclude_frames = 50;
+  options.exclude_s = 8.0;
+  options.top_k = 1000;
+  options.shortlist = 0;
+  const PlaceIndex index = filled(options, 200);
+  const auto latest = [&](int frame, double stamp_s) {
+    std::int64_t last = -1;
+    for (const auto& each : index.search(FrameId{frame}, stamp_s, random_context(7))) last = std::max(last, each.match.value);
+    return last;
+  };
+  EXPECT_EQ(latest(200, 20.0), 120) << "8 s are 80 frames here";
+  EXPECT_EQ(latest(200, 100.0), 150) << "50 frames";
+  EXPECT_EQ(latest(79, 7.9), -1);
+  EXPECT_FALSE(index.has_searchable_past(FrameId{79}, 7.9));
+  EXPECT_TRUE(index.has_searchable_past(FrameId{80}, 8.0));
+}
+
+TEST(PlaceIndex, TheFirstPlaceCanBeFound) {
+  const PlaceIndex index = filled({}, 100);
+  const auto found = index.search(FrameId{500}, 500.0, random_context(0));
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found[0].match.value, 0);
+  EXPECT_DOUBLE_EQ(found[0].geometry_score, 1.0);
+}
+
+TEST(PlaceIndex, RanksAsComparingAllByHand) {
+  RetrievalOptions options;
+  options.shortlist = 0;
+  options.top_k = 10;
+  const PlaceIndex index = filled(options, 120);
+  const IntensityScanContext query = random_context(1000);
+  std::vector<std::pair<double, std::int64_t>> by_hand;
+  for (int i = 0; i < 120; ++i)
+    by_hand.emplace_back(-match_descriptors(query, random_context(static_cast<unsigned>(i))).score(), i);
+  std::sort(by_hand.begin(), by_hand.end());
+  const auto found = index.search_all(query);
+  ASSERT_EQ(found.size(), 10u);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    EXPECT_EQ(found[i].match.value, by_hand[i].second);
+    EXPECT_DOUBLE_EQ(found[i].score(), -by_hand[i].first);
+  }
+}
+
+TEST(PlaceIndex, GatesAndShortlistAreKept) {
+  RetrievalOptions options;
+  options.top_k = 1000;
+  options.shortlist = 7;
+  EXPECT_EQ(filled(options, 100).search_all(random_context(5)).size(), 7u);
+  options.shortlist = 0;
+  options.min_geometry_score = 0.999;
+  EXPECT_EQ(filled(options, 100).search_all(random_context(5)).size(), 1u) << "itself alone";
+  options.min_geometry_score = 0.0;
+  options.min_intensity_score = 0.999;
+  EXPECT_EQ(filled(options, 100).search_all(random_context(5)).size(), 1u);
+}
+
+TEST(PlaceIndex, MisuseThrows) {
+  PlaceIndex index = filled({}, 3);
+  EXPECT_THROW(index.add(FrameId{2}, 1.0, random_context(1)), std::invalid_argument);
+  DescriptorOptions other;
+  other.rings = 5;
+  EXPECT_THROW(index.add(FrameId{9}, 1.0, describe({}, other)), std::invalid_argument);
+  EXPECT_EQ(index.find(FrameId{9}), nullptr);
+  EXPECT_NE(index.find(FrameId{2}), nullptr);
+}
+
+}  // namespace
+}  // namespace revisit

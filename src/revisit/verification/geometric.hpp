@@ -5,7 +5,7 @@
 
 #include <revisit/config/parameters.hpp>
 #include <revisit/core/loop.hpp>
-#include <revisit/registration/surface_cloud.hpp>
+#include <revisit/registration/feature_alignment.hpp>
 
 namespace revisit {
 
@@ -21,9 +21,10 @@ struct GeometricEvidence {
   std::string reason;          ///< why not consistent
 };
 
-/// Geometric consistency (paper, section III-D): registers the query onto the match from FPFH's transform and from the
-/// yaw that the descriptors agreed on, keeps the better, and judges it. Deterministic; safe from several threads.
-GeometricEvidence check_geometric(const SurfaceCloud& match, const SurfaceCloud& query, double yaw_rad,
+/// Geometric consistency (paper, section III-D): registers the query onto the match by ICP, from the yaw that the
+/// descriptors agreed on and, where that is not consistent, from FPFH's transform; judges the better of both.
+/// Deterministic; one thread a scan.
+GeometricEvidence check_geometric(ScanGeometry& match, ScanGeometry& query, double yaw_rad,
                                   const GeometricOptions& options);
 
 }  // namespace revisit

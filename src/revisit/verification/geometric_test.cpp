@@ -1,1 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/verification/geometric.hpp>
+
 #include <gtest/gtest.h>
+
+#include "synthetic_world.hpp"
+
+namespace revisit {
+namespace {
+
+using testing_support::SyntheticWorld;
+
+ScanGeometry scan_at(unsigned world, const Pose& T_world_lidar) {
+  const Scan scan = SyntheticWorld(world).scan(T_world_lidar, {32, 900, -24.8, 5.0});
+  std::vector<std::uint8_t> ground;
+  for (const Point& p : scan.points) ground.push_back(p.z < -1.6f);
+  return ScanGeometry(thin(scan.points, ground, 1.0));
+}
+
+TEST(GeometricConsistency, ARevisitGivesItsPose) {
+  const Pose T_match = SyntheticWorld::at(0, 0, 0), T_query = SyntheticWorld::at(2, 1, to_radians(175.0));
+  ScanGeometry match = scan_at(31, T_match), query = scan_at(31, T_query);
+  const GeometricEvidence evidence = check_geometric(match, query, to_radians(180.0), {});
+  ASSERT_TRUE(evidence.consistent) << evidence.reason;
+  const Pose error = (T_match.inverse() * T_query).inverse() * evidence.T_match_query;
+  EXPECT_LT(error.translation().norm(), 0.1);
+  EXPECT_LT(to_degrees(rotation_angle(error)), 0.3);
+  EXPECT_FALSE(evidence.from_features) << "the descriptor's yaw was good enough";
+}
+
+TEST(GeometricConsistency, FeaturesSaveAWrongYaw) {
+  const Pose T_match = SyntheticWorld::at(0, 0, 0), T_query = SyntheticWorld::at(2, 1, to_radians(100.0));
+  ScanGeometry match = scan_at(31, T_match), query = scan_at(31, T_query);
+  const GeometricEvidence evidence = check_geometric(match, query, 0.0, {});
+  ASSERT_TRUE(evidence.consistent) << evidence.reason;
+  EXPECT_TRUE(evidence.from_features);
+  EXPECT_GT(evidence.feature_inliers, 9u);
+  const Pose error = (T_match.inverse() * T_query).inverse() * evidence.T_match_query;
+  EXPECT_LT(error.translation().norm(), 0.1);
+}
+
+TEST(GeometricConsistency, AnotherPlaceIsRefused) {
+  for (const unsigned other : {32u, 33u, 34u}) {
+    ScanGeometry match = scan_at(31, SyntheticWorld::at(0, 0, 0)), query = scan_at(other, SyntheticWorld::at(0, 0, 0));
+    const GeometricEvidence evidence = check_geometric(match, query, 0.0, {});
+    EXPECT_FALSE(evidence.consistent);
+    EXPECT_NE(evidence.reason.find("inlier ratio"), std::string::npos) << evidence.reason;
+  }
+}
+
+TEST(GeometricConsistency, TheFarthestTranslationIsKept) {
+  ScanGeometry match = scan_at(31, SyntheticWorld::at(0, 0, 0)), query = scan_at(31, SyntheticWorld::at(2, 0, 0));
+  GeometricOptions options;
+  options.max_translation_m = 1.0;
+  const GeometricEvidence evidence = check_geometric(match, query, 0.0, options);
+  EXPECT_FALSE(evidence.consistent);
+  EXPECT_NE(evidence.reason.find("translation 2.0 m above 1.0 m"), std::string::npos) << evidence.reason;
+}
+
+TEST(GeometricConsistency, NothingToRegister) {
+  ScanGeometry match = scan_at(31, SyntheticWorld::at(0, 0, 0)), nothing{ThinCloud{}};
+  EXPECT_FALSE(check_geometric(match, nothing, 0.0, {}).consistent);
+  EXPECT_FALSE(check_geometric(nothing, match, 0.0, {}).consistent);
+}
+
+}  // namespace
+}  // namespace revisit

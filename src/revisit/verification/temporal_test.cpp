@@ -1,1 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/verification/temporal.hpp>
+
+#include <map>
+#include <random>
+
 #include <gtest/gtest.h>
+
+#include <revisit/descriptors/similarity.hpp>
+
+namespace revisit {
+namespace {
+
+IntensityScanContext place(unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<float> at(0.f, 20.f);
+  std::uniform_real_distribution<float> reading(0.f, 1.f);
+  std::vector<Point> points(500);
+  for (Point& p : points) p = {at(random), at(random), 0.f, reading(random)};
+  return describe(points, {});
+}
+
+// A drive over the places 0..9, later again: forward as frames 100..109, and backward as frames 200..209.
+class TemporalConsistency : public testing::Test {
+ protected:
+  TemporalConsistency() {
+    for (int i = 0; i < 10; ++i) {
+      descriptors_[FrameId{i}] = place(static_cast<unsigned>(i));
+      descriptors_[FrameId{100 + i}] = place(static_cast<unsigned>(i));
+      descriptors_[FrameId{200 + i}] = place(static_cast<unsigned>(9 - i));
+    }
+  }
+  TemporalEvidence check(int query, int match, double min_score = 1.8) const {
+    const DescriptorLookup lookup = [this](FrameId frame) {
+      const auto found = descriptors_.find(frame);
+      return found == descriptors_.end() ? nullptr : &found->second;
+    };
+    TemporalOptions options;
+    options.min_score = min_score;
+    return check_temporal(FrameId{query}, FrameId{match}, lookup, lookup, options);
+  }
+  std::map<FrameId, IntensityScanContext> descriptors_;
+};
+
+TEST_F(TemporalConsistency, ForwardVisit) {
+  const TemporalEvidence evidence = check(107, 7);
+  EXPECT_EQ(evidence.forward_pairs, 5);
+  EXPECT_NEAR(evidence.score, 2.0, 1e-9);
+  EXPECT_FALSE(evidence.reverse);
+  EXPECT_TRUE(evidence.consistent);
+}
+
+TEST_F(TemporalConsistency, ReverseVisitRunsTheCandidatesIndexTheOtherWay) {
+  const TemporalEvidence evidence = check(206, 3);  // frame 206 is place 3; frames before it are places 4, 5, ...
+  EXPECT_TRUE(evidence.reverse);
+  EXPECT_NEAR(evidence.score, 2.0, 1e-9);
+  EXPECT_LT(evidence.forward_score, 1.8);
+}
+
+TEST_F(TemporalConsistency, AWrongPlaceIsRefusedWithItsScore) {
+  const TemporalEvidence evidence = check(107, 2);
+  EXPECT_FALSE(evidence.consistent);
+  EXPECT_NE(evidence.reason.find("below 1.800"), std::string::npos) << evidence.reason;
+  EXPECT_TRUE(check(107, 2, 0.0).consistent) << "a threshold of 0 never refuses";
+}
+
+TEST_F(TemporalConsistency, IsThePlainMeanOfThePairsThatExist) {
+  double sum = 0.0;
+  for (int k = 1; k <= 2; ++k)  // frames before 0 do not exist
+    sum += match_descriptors(descriptors_.at(FrameId{108 - k}), descriptors_.at(FrameId{2 - k})).score();
+  const TemporalEvidence evidence = check(108, 2);
+  EXPECT_EQ(evidence.forward_pairs, 2);
+  EXPECT_DOUBLE_EQ(evidence.forward_score, sum / 2.0);
+}
+
+TEST_F(TemporalConsistency, WithoutPairsThereIsNothingToRefuseBy) {
+  const TemporalEvidence evidence = check(100, 5);  // frames 95..99 do not exist
+  EXPECT_EQ(evidence.forward_pairs + evidence.reverse_pairs, 0);
+  EXPECT_TRUE(evidence.consistent);
+}
+
+}  // namespace
+}  // namespace revisit

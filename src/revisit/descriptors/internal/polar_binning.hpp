@@ -27,7 +27,8 @@ void bin_points(const Point* points, std::size_t count, const PolarGrid& grid, s
 /// The readable reference of bin_points.
 void bin_points_scalar(const Point* points, std::size_t count, const PolarGrid& grid, std::uint16_t* cells);
 
-/// The instruction sets that this processor can run, as Highway's target bits, for tests that force each.
+/// The instruction sets that this processor can run, as Highway's target bits, for tests that force each; while one is
+/// forced, that one alone.
 std::vector<std::int64_t> supported_targets();
 /// Forces one target for bin_points; 0 returns to the best. Not for use while other threads describe.
 void force_target(std::int64_t target);
