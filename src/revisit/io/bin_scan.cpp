@@ -22,11 +22,11 @@ T load(const char* bytes) {
   return value;
 }
 
-// A number that a sensor could have written: no value, zero, or of a size that metres and intensities have.
-// Floats made from other data mostly have wild exponents.
+// A number that a sensor could have written: no value, zero, rounding noise, or of a size that metres and intensities
+// have. Floats made from other data mostly have wild exponents.
 bool is_plausible(float value) {
   const float size = std::abs(value);
-  return !std::isfinite(value) || size == 0.f || (size > 1e-9f && size < 1e6f);
+  return !std::isfinite(value) || size == 0.f || (size > 1e-25f && size < 1e6f);
 }
 
 // The share of the records that pass `test`; every n-th one is looked at, some 4,000 in all.
@@ -59,7 +59,7 @@ bool is_nuscenes(const std::string& bytes) {
 }
 
 bool is_kitti(const std::string& bytes) {
-  return bytes.size() % kKittiBytes == 0 && share_of_records(bytes, kKittiBytes, is_plausible_point) > 0.999;
+  return bytes.size() % kKittiBytes == 0 && share_of_records(bytes, kKittiBytes, is_plausible_point) > 0.99;
 }
 
 bool is_nclt(const std::string& bytes) {

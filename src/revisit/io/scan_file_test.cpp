@@ -54,6 +54,13 @@ TEST(ReadBin, DropsAndCountsUnusablePoints) {
   EXPECT_EQ(scan->dropped_at_origin, 1u);
 }
 
+TEST(ReadBin, CoordinatesThatAreZeroButForRoundingAreNoReasonToDoubt) {
+  std::string bytes;
+  for (int i = 0; i < 200; ++i)
+    for (const float value : {i % 3 == 0 ? 4e-16f : 5.f, 7.f, 0.f, 0.5f}) append(bytes, value);
+  EXPECT_TRUE(read_scan(write_file("a.bin", bytes)));
+}
+
 TEST(ReadBin, FiveFloatsWithRings) {
   std::string bytes;
   for (int i = 0; i < 64; ++i)

@@ -24,7 +24,7 @@ class TextWriter {
 
   /// Everything written so far is with the system when this returns without an error.
   Status flush() {
-    errno = 0;
+    if (stream_) errno = 0;  // a write that failed before has left its reason there
     stream_.flush();
     note_failure();
     return status();

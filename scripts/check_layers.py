@@ -1,0 +1,107 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Checks who includes whom (docs/architecture.md). Prints each breach and exits with 1 if there is any."""
+import pathlib
+import re
+import sys
+
+CORE_CONFIG = {"core", "config"}
+ALL_BUT_EVALUATION_AND_SIMULATION = {
+    "core", "bits", "config", "io", "preprocess", "descriptors", "retrieval", "registration", "verification",
+    "odometry", "pose_graph", "mapping", "store"}
+ALLOWED = {
+    "core": set(),
+    "bits": set(),
+    "config": {"core"},
+    "io": CORE_CONFIG,
+    "preprocess": CORE_CONFIG,
+    "registration": CORE_CONFIG,
+    "pose_graph": CORE_CONFIG,
+    "mapping": CORE_CONFIG,
+    "evaluation": CORE_CONFIG,
+    "simulation": CORE_CONFIG | {"io"},
+    "descriptors": CORE_CONFIG | {"bits"},
+    "retrieval": CORE_CONFIG | {"bits", "descriptors"},
+    "odometry": CORE_CONFIG | {"registration"},
+    "verification": CORE_CONFIG | {"registration", "descriptors"},
+    "store": CORE_CONFIG | {"bits"},
+    "pipeline": ALL_BUT_EVALUATION_AND_SIMULATION,
+}
+# One door for each outside library: headers that begin so may stand in these places only.
+DOORS = {
+    "pcl/": {"src/revisit/io", "src/revisit/registration"},
+    "hwy/": {"src/revisit/bits", "src/revisit/descriptors"},
+    "nanoflann": {"src/revisit/registration"},
+    "toml++": {"src/revisit/config"},
+    "nlohmann/": {"src/revisit/io", "src/revisit/config", "apps"},
+    "cairo": {"apps/cli"},
+    "CLI/": {"apps/cli"},
+    "spdlog/": {"apps/cli"},
+}
+INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
+
+
+def breaches_of(path, text):
+    """The breaches in one file, given by its path relative to the project."""
+    parts = path.parts
+    module = parts[2] if parts[:2] == ("src", "revisit") and len(parts) > 3 else None
+    is_test = path.stem.endswith("_test") or parts[0] in ("tests", "benchmarks")
+    for number, line in enumerate(text.splitlines(), 1):
+        match = INCLUDE.match(line)
+        if not match:
+            continue
+        header = match.group(1)
+        place = f"{path}:{number}: "
+        for prefix, places in DOORS.items():
+            if header.startswith(prefix) and not any(str(path).startswith(p + "/") for p in places):
+                yield f"{place}{header} may be included from {', '.join(sorted(places))} only"
+        if module == "bits" and not is_test and header.startswith("Eigen"):
+            yield f"{place}bits does without Eigen"
+        if not header.startswith("revisit/"):
+            continue
+        target = header.split("/")[1]
+        if "/internal/" in header and module != target and parts[0] != "benchmarks":
+            yield f"{place}{header} is internal to {target}"
+        # Tests check a module against others; the order of the modules is a rule for the library.
+        if module is None or is_test or target == module:
+            continue
+        if module not in ALLOWED:
+            yield f"{place}module {module} is unknown: add it to ALLOWED"
+        elif target not in ALLOWED[module]:
+            yield f"{place}{module} may not include {target}"
+
+
+def self_test():
+    bad = [("src/revisit/core/a.hpp", "#include <revisit/io/recording.hpp>"),
+           ("src/revisit/retrieval/a.cpp", "#include <revisit/pipeline/prepare.hpp>"),
+           ("src/revisit/pipeline/a.cpp", "#include <revisit/evaluation/reference.hpp>"),
+           ("src/revisit/pipeline/a.cpp", "#include <revisit/io/internal/bytes.hpp>"),
+           ("src/revisit/verification/a.cpp", "#include <pcl/features/fpfh.h>"),
+           ("apps/cli/a.cpp", '#include "revisit/descriptors/internal/polar_binning.hpp"')]
+    good = [("src/revisit/pipeline/a.cpp", "#include <revisit/io/recording.hpp>"),
+            ("src/revisit/io/a.cpp", "#include <revisit/io/internal/bytes.hpp>"),
+            ("src/revisit/io/a.cpp", "#include <pcl/io/pcd_io.h>")]
+    missed = [case for case in bad if not list(breaches_of(pathlib.Path(case[0]), case[1]))]
+    wrong = [case for case in good if list(breaches_of(pathlib.Path(case[0]), case[1]))]
+    for case in missed:
+        print("not noticed:", *case)
+    for case in wrong:
+        print("wrongly refused:", *case)
+    return 1 if missed or wrong else 0
+
+
+def main():
+    if "--self-test" in sys.argv:
+        return self_test()
+    root = pathlib.Path(__file__).resolve().parent.parent
+    found = []
+    for folder in ("src", "apps", "examples", "benchmarks", "tests"):
+        for path in sorted((root / folder).rglob("*")):
+            if path.suffix in (".hpp", ".cpp", ".h"):
+                found += breaches_of(path.relative_to(root), path.read_text())
+    print("\n".join(found) if found else "layers: no breach")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: Apache-2.0
+// The program as a user meets it: exit codes, messages, files, on good and on bad input.
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <revisit/io/pose_file.hpp>
+#include <revisit/io/result_files.hpp>
+
+#include "shared_data.hpp"
+#include "synthetic_world.hpp"
+
+namespace revisit {
+namespace {
+
+namespace fs = std::filesystem;
+using testing_support::fresh_folder;
+using testing_support::shared_data;
+using testing_support::SyntheticWorld;
+
+struct Outcome {
+  int code = -1;
+  std::string output;  // both streams
+};
+
+Outcome run(const std::string& arguments) {
+  Outcome outcome;
+  FILE* pipe = popen((std::string(REVISIT_PROGRAM) + " " + arguments + " 2>&1 </dev/null").c_str(), "r");
+  char buffer[4096];
+  while (const std::size_t n = fread(buffer, 1, sizeof buffer, pipe)) outcome.output.append(buffer, n);
+  const int status = pclose(pipe);
+  outcome.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return outcome;
+}
+
+std::string content(const fs::path& file) {
+  std::stringstream text;
+  text << std::ifstream(file).rdbuf();
+  return text.str();
+}
+
+void write_points(const fs::path& file, const std::vector<Point>& points) {
+  std::ofstream(file, std::ios::binary)
+      .write(reinterpret_cast<const char*>(points.data()), static_cast<std::streamsize>(points.size() * sizeof(Point)));
+}
+
+void write_scan(const fs::path& folder, int frame, const std::vector<Point>& points) {
+  char name[32];
+  std::snprintf(name, sizeof name, "%06d.bin", frame);
+  write_points(folder / name, points);
+}
+
+std::vector<Point> scan_at(double x, double yaw_deg = 0.0) {
+  static const SyntheticWorld world(71);
+  return world.scan(SyntheticWorld::at(x, 0, to_radians(yaw_deg)), {32, 450, -24.8, 5.0}).points;
+}
+
+// A KITTI-like folder: out along x and back again, with poses in the LiDAR's own frame. 4 m a frame, 12 frames.
+fs::path there_and_back(const fs::path& folder) {
+  fs::create_directories(folder / "velodyne");
+  Trajectory trajectory;
+  for (int i = 0; i < 12; ++i) {
+    const double x = i < 6 ? 4.0 * i : 4.0 * (11 - i) + 0.5, yaw_deg = i < 6 ? 0.0 : 180.0;
+    write_scan(folder / "velodyne", i, scan_at(x, yaw_deg));
+    trajectory.entries[FrameId{i}] = {i * 1.0, SyntheticWorld::at(x, 0, to_radians(yaw_deg))};
+  }
+  EXPECT_TRUE(write_kitti_poses(folder / "poses.txt", trajectory, std::nullopt));
+  std::ofstream times(folder / "times.txt");
+  for (int i = 0; i < 12; ++i) times << i << "\n";
+  return folder;
+}
+
+const std::string kShortExclusion = " --retrieval.exclude_frames 4 --retrieval.exclude_s 4";
+
+TEST(Cli, HelpTeachesAndWrongUseIsCode2) {
+  const Outcome help = run("--help");
+  EXPECT_EQ(help.code, 0);
+  for (const char* word : {"detect", "evaluate", "describe", "calibrate", "info", "Exit code"})
+    EXPECT_NE(help.output.find(word), std::string::npos) << word;
+  EXPECT_NE(run("detect --help").output.find("candidates.csv"), std::string::npos);
+  EXPECT_EQ(run("").code, 2);
+  EXPECT_EQ(run("fly").code, 2);
+  EXPECT_EQ(run("detect").code, 2);
+  EXPECT_EQ(run("--version").code, 0);
+}
+
+TEST(Cli, AWrongParameterIsNamedWithItsAllowedRange) {
+  const Outcome outcome = run("detect /tmp --out /tmp/x --descriptor.rings 9999");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_NE(outcome.output.find("descriptor.rings = 9999 is not allowed; allowed: a whole number, 1 to 512"), std::string::npos)
+      << outcome.output;
+  const fs::path file = fresh_folder() / "p.toml";
+  std::ofstream(file) << "[retrieval]\ntopk = 3\n";
+  const Outcome unknown = run("parameters --parameters " + file.string());
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_NE(unknown.output.find("did you mean 'retrieval.top_k'"), std::string::npos) << unknown.output;
+  EXPECT_NE(run("parameters --preset paper").output.find("min_score = 1.8"), std::string::npos);
+}
+
+TEST(Cli, DetectAndEvaluateARecordingWithLoops) {
+  const fs::path folder = fresh_folder(), recording = there_and_back(folder / "recording"), out = folder / "out";
+  const Outcome detect = run("detect " + recording.string() + " --out " + out.string() + kShortExclusion);
+  ASSERT_EQ(detect.code, 0) << detect.output;
+  const auto loops = read_loops(out / "loops.csv");
+  ASSERT_TRUE(loops) << loops.error().message;
+  EXPECT_GE(loops->size(), 3u) << detect.output;
+  const auto candidates = read_candidates(out / "candidates.csv");
+  ASSERT_TRUE(candidates);
+  EXPECT_EQ(candidates->size(), 8u) << "frames 4 to 11 have a searchable past";
+  for (const char* name : {"run.json", "poses.txt", "poses.tum"}) EXPECT_TRUE(fs::exists(out / name)) << name;
+  EXPECT_NE(content(out / "run.json").find("\"retrieval.exclude_frames\": 4"), std::string::npos);
+
+  const Outcome evaluate = run("evaluate " + out.string() + " --reference " + (recording / "poses.txt").string());
+  ASSERT_EQ(evaluate.code, 0) << evaluate.output;
+  EXPECT_NE(evaluate.output.find("Table 2"), std::string::npos);
+  EXPECT_NE(content(out / "evaluation.json").find("\"false_loops\": 0"), std::string::npos) << evaluate.output;
+  for (const char* name : {"precision_recall.png", "trajectory.png", "report.html"})
+    EXPECT_GT(fs::file_size(out / name), 1000u) << name;
+
+  const Outcome again = run("detect " + recording.string() + " --out " + out.string());
+  EXPECT_EQ(again.code, 1);
+  EXPECT_NE(again.output.find("--overwrite"), std::string::npos) << "results are not lost by a second run";
+}
+
+TEST(Cli, ABrokenScanAmongGoodOnesIsSkippedAndTold) {
+  const fs::path folder = fresh_folder(), recording = there_and_back(folder / "recording"), out = folder / "out";
+  fs::resize_file(recording / "velodyne" / "000003.bin", 1001);
+  const Outcome outcome = run("detect " + recording.string() + " --out " + out.string() + kShortExclusion);
+  EXPECT_EQ(outcome.code, 3) << outcome.output;
+  EXPECT_NE(outcome.output.find("000003.bin: 1001 bytes"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("11 scans"), std::string::npos) << "the others are used";
+  EXPECT_NE(content(out / "run.json").find("000003.bin"), std::string::npos);
+}
+
+TEST(Cli, RecordingsOfNoUseFailWithAMessage) {
+  const fs::path folder = fresh_folder();
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  struct Case {
+    const char* name;
+    std::vector<Point> points;
+    const char* message;
+  };
+  for (const Case& each : {Case{"empty_scan", {}, "empty file"},
+                           {"one_point", {{20.f, 3.f, 0.f, 0.5f}}, "are needed to describe a place"},
+                           {"one_cell", std::vector<Point>(500, {20.f, 3.f, 0.f, 0.5f}), "occupy 1 of"},
+                           {"nan", std::vector<Point>(500, {nan, nan, nan, nan}), "500 not finite"}}) {
+    const fs::path recording = folder / each.name;
+    fs::create_directories(recording);
+    for (int i = 0; i < 3; ++i) write_scan(recording, i, each.points);
+    const Outcome outcome = run("detect " + recording.string() + " --out " + (folder / "out").string() + " --overwrite");
+    EXPECT_EQ(outcome.code, 1) << each.name << ": " << outcome.output;
+    EXPECT_NE(outcome.output.find(each.message), std::string::npos) << outcome.output;
+    EXPECT_EQ(run("describe " + (recording / "000000.bin").string() + " " + (folder / "a.png").string()).code, 1) << each.name;
+  }
+  EXPECT_NE(run("detect /no/such --out /tmp/x").output.find("/no/such: no such folder"), std::string::npos);
+  fs::create_directories(folder / "nothing");
+  const Outcome nothing = run("detect " + (folder / "nothing").string() + " --out " + (folder / "o").string());
+  EXPECT_EQ(nothing.code, 1);
+  EXPECT_NE(nothing.output.find("holds no scan"), std::string::npos);
+  EXPECT_FALSE(fs::exists(folder / "o")) << "no folder is made for nothing";
+}
+
+TEST(Cli, EqualIntensitiesAreToldAndGeometryServes) {
+  const fs::path folder = fresh_folder(), recording = there_and_back(folder / "recording");
+  for (const auto& entry : fs::directory_iterator(recording / "velodyne")) {
+    std::vector<Point> points(fs::file_size(entry) / sizeof(Point));
+    std::ifstream(entry.path(), std::ios::binary).read(reinterpret_cast<char*>(points.data()), static_cast<std::streamsize>(points.size() * sizeof(Point)));
+    for (Point& p : points) p.intensity = 7.f;
+    write_points(entry.path(), points);
+  }
+  const Outcome outcome = run("detect " + recording.string() + " --out " + (folder / "out").string() + kShortExclusion);
+  EXPECT_EQ(outcome.code, 3) << outcome.output;
+  EXPECT_NE(outcome.output.find("all intensities are equal"), std::string::npos) << outcome.output;
+  EXPECT_GE(read_loops(folder / "out" / "loops.csv")->size(), 3u);
+}
+
+TEST(Cli, AFullDiskIsToldNotIgnored) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "needs /dev/full";
+  const fs::path folder = fresh_folder(), recording = there_and_back(folder / "recording"), out = folder / "out";
+  for (const char* name : {"candidates.csv", "loops.csv", "poses.txt", "run.json"}) {
+    fs::remove_all(out);
+    fs::create_directories(out);
+    fs::create_symlink("/dev/full", out / name);
+    const Outcome outcome = run("detect " + recording.string() + " --overwrite --out " + out.string() + kShortExclusion);
+    EXPECT_EQ(outcome.code, 1) << name << ": " << outcome.output;
+    EXPECT_NE(outcome.output.find(std::string(name) + ": cannot be written: No space left on device"), std::string::npos)
+        << outcome.output;
+  }
+  EXPECT_EQ(run("describe " + (recording / "velodyne" / "000000.bin").string() + " /dev/full").code, 1);
+}
+
+TEST(Cli, AFolderThatMayNotBeReadIsNamed) {
+  const fs::path folder = fresh_folder(), locked = folder / "locked";
+  fs::create_directories(locked);
+  write_scan(locked, 0, scan_at(0));
+  fs::permissions(locked, fs::perms::none);
+  // Root reads everything: ask as somebody else.
+  const pid_t child = fork();
+  if (child == 0) {
+    if (geteuid() == 0 && (setgid(65534) != 0 || setuid(65534) != 0)) _exit(99);
+    const Outcome outcome = run("info " + locked.string());
+    _exit(outcome.code == 1 && outcome.output.find("Permission denied") != std::string::npos ? 0 : 1);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  fs::permissions(locked, fs::perms::owner_all);
+  if (WEXITSTATUS(status) == 99) GTEST_SKIP() << "cannot become another user";
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
+TEST(Cli, CtrlCLeavesCompleteRows) {
+  const fs::path folder = fresh_folder(), recording = folder / "recording", out = folder / "out";
+  fs::create_directories(recording);
+  for (int i = 0; i < 400; ++i) write_scan(recording, i, i < 3 ? scan_at(0.5 * i) : std::vector<Point>());
+  for (int i = 3; i < 400; ++i) {
+    char name[32];
+    std::snprintf(name, sizeof name, "%06d.bin", i);
+    fs::remove(recording / name);
+    fs::create_symlink(recording / "000001.bin", recording / name);
+  }
+  const pid_t child = fork();
+  if (child == 0) {
+    std::freopen("/dev/null", "w", stderr);
+    std::freopen("/dev/null", "w", stdout);
+    execl(REVISIT_PROGRAM, "revisit", "detect", recording.c_str(), "--out", out.c_str(), "--retrieval.exclude_frames",
+          "2", "--retrieval.exclude_s", "0", static_cast<char*>(nullptr));
+    _exit(127);
+  }
+  // As soon as the first answer is written, interrupt.
+  while (!fs::exists(out / "loops.csv") || content(out / "loops.csv").find('\n', 80) == std::string::npos) {
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, WNOHANG), 0) << "ended before it could be interrupted";
+    usleep(2000);
+  }
+  kill(child, SIGINT);
+  int status = 0;
+  waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  const auto rows = read_candidates(out / "candidates.csv");
+  ASSERT_TRUE(rows) << rows.error().message;
+  EXPECT_GE(rows->size(), 1u);
+  EXPECT_LT(rows->size(), 398u);
+  EXPECT_TRUE(read_loops(out / "loops.csv"));
+  EXPECT_EQ(content(out / "candidates.csv").back(), '\n');
+  EXPECT_NE(content(out / "run.json").find("\"interrupted\": true"), std::string::npos);
+}
+
+TEST(Cli, DescribeDrawsAndInfoTells) {
+  const fs::path folder = fresh_folder(), recording = there_and_back(folder / "recording");
+  const std::string scan = (recording / "velodyne" / "000000.bin").string();
+  const Outcome describe = run("describe " + scan + " --out " + (folder / "a.png").string());
+  EXPECT_EQ(describe.code, 0) << describe.output;
+  EXPECT_EQ(content(folder / "a.png").substr(1, 3), "PNG");
+  const Outcome info = run("info " + recording.string());
+  EXPECT_EQ(info.code, 0) << info.output;
+  for (const char* fact : {"KITTI odometry folder", "scans        12", "poses        12", "rate         1.00 Hz", "rings        32"})
+    EXPECT_NE(info.output.find(fact), std::string::npos) << fact << "\n" << info.output;
+  EXPECT_EQ(run("info " + scan).code, 0);
+  EXPECT_EQ(run("info /no/such.bin").code, 1);
+}
+
+TEST(Cli, CalibrateLearnsAndDetectApplies) {
+  const fs::path folder = fresh_folder(), recording = there_and_back(folder / "recording"), phi = folder / "phi.json";
+  const Outcome learn = run("calibrate " + recording.string() + " --out " + phi.string());
+  ASSERT_EQ(learn.code, 0) << learn.output;
+  EXPECT_NE(learn.output.find("disagreement"), std::string::npos);
+  const Outcome apply = run("detect " + recording.string() + " --out " + (folder / "out").string() + " --calibration " + phi.string());
+  EXPECT_EQ(apply.code, 0) << apply.output;
+  std::ofstream(phi) << "{}";
+  EXPECT_EQ(run("describe " + (recording / "velodyne" / "000000.bin").string() + " " + (folder / "a.png").string() + " --calibration " + phi.string()).code, 1);
+}
+
+TEST(CliOnRealScans, WhatTheProjectMustShow) {
+  REVISIT_NEEDS_SHARED_DATA();
+  const fs::path folder = fresh_folder();
+  const std::string raw = (shared_data() / "kitti_raw_0005").string();
+  // Ten frames apart every scan has a neighbour 3 to 4.5 m behind: each accepted loop must agree with GPS/IMU.
+  ASSERT_EQ(run("detect " + raw + " --out " + (folder / "raw").string() + " --retrieval.exclude_frames 10 --retrieval.exclude_s 1").code, 0);
+  const Outcome evaluate = run("evaluate " + (folder / "raw").string() + " --reference " + raw);
+  ASSERT_EQ(evaluate.code, 0) << evaluate.output;
+  const std::string figures = content(folder / "raw" / "evaluation.json");
+  EXPECT_NE(figures.find("\"false_loops\": 0"), std::string::npos) << evaluate.output;
+  EXPECT_EQ(figures.find("\"accepted\": 0"), std::string::npos) << evaluate.output;
+}
+
+}  // namespace
+}  // namespace revisit
