@@ -4,8 +4,8 @@
 #include <limits>
 
 #include <revisit/core/pose.hpp>
+#include <revisit/preprocess/internal/fast_angle.hpp>
 #include <revisit/preprocess/internal/polar_ground.hpp>
-#include <revisit/preprocess/internal/range_image.hpp>
 
 namespace revisit::preprocess_internal {
 namespace {

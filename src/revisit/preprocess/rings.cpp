@@ -8,6 +8,7 @@
 #include <optional>
 
 #include <revisit/core/pose.hpp>
+#include <revisit/preprocess/internal/fast_angle.hpp>
 
 namespace revisit {
 namespace {
@@ -15,16 +16,23 @@ namespace {
 constexpr std::size_t kMostRings = 256;
 constexpr std::size_t kFewestPoints = 200;  // of a scan whose rings are worth looking for
 
-// Tangent of the elevation: grows with it, and needs no trigonometry.
-float slope(const Point& p) { return p.z / std::sqrt(p.x * p.x + p.y * p.y + 1e-12f); }
+// Elevation of each point, radians.
+std::vector<float> elevations_of(const Scan& scan) {
+  std::vector<float> elevations(scan.points.size());
+  for (std::size_t i = 0; i < elevations.size(); ++i) {
+    const Point& p = scan.points[i];
+    elevations[i] = preprocess_internal::approximate_atan2(p.z, std::sqrt(p.x * p.x + p.y * p.y));
+  }
+  return elevations;
+}
 
 // Renumbers labels [0, count) by the mean elevation of their points; labels without points vanish.
-Rings number_by_elevation(const Scan& scan, const std::vector<std::uint16_t>& labels, std::size_t count,
-                          RingSource source) {
+Rings number_by_elevation(const std::vector<float>& elevations, const std::vector<std::uint16_t>& labels,
+                          std::size_t count, RingSource source) {
   std::vector<double> sums(count, 0.0);
   std::vector<std::size_t> sizes(count, 0);
   for (std::size_t i = 0; i < labels.size(); ++i) {
-    sums[labels[i]] += slope(scan.points[i]);
+    sums[labels[i]] += elevations[i];
     ++sizes[labels[i]];
   }
   std::vector<std::uint16_t> order;
@@ -37,7 +45,7 @@ Rings number_by_elevation(const Scan& scan, const std::vector<std::uint16_t>& la
   rings.source = source;
   for (std::size_t ring = 0; ring < order.size(); ++ring) {
     ring_of_label[order[ring]] = static_cast<std::uint16_t>(ring);
-    rings.elevations_rad.push_back(static_cast<float>(std::atan(mean(order[ring]))));
+    rings.elevations_rad.push_back(static_cast<float>(mean(order[ring])));
   }
   rings.of_point.resize(labels.size());
   for (std::size_t i = 0; i < labels.size(); ++i) rings.of_point[i] = ring_of_label[labels[i]];
@@ -46,32 +54,36 @@ Rings number_by_elevation(const Scan& scan, const std::vector<std::uint16_t>& la
 
 // KITTI's files hold ring after ring, each a turn that starts straight ahead: y jumps from negative to positive ahead
 // of the sensor. The turns are rings if there are enough of them and their mean elevation runs one way.
-std::optional<Rings> rings_from_order(const Scan& scan) {
+std::optional<Rings> rings_from_order(const Scan& scan, const std::vector<float>& elevations) {
   std::vector<std::uint16_t> labels(scan.points.size());
-  std::vector<double> sums(1, 0.0);
-  std::vector<std::size_t> sizes(1, 0);
+  std::vector<double> means;
   bool behind_seen = false;  // noise around the start must not count as a turn
+  std::size_t turn_begin = 0;
+  float sum = 0.f;
+  const auto end_turn = [&](std::size_t end) {
+    means.push_back(static_cast<double>(sum) / static_cast<double>(end - turn_begin));
+    turn_begin = end;
+    sum = 0.f;
+    behind_seen = false;
+  };
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const Point& p = scan.points[i];
     behind_seen |= p.x < 0.f;
-    if (i > 0 && behind_seen && p.x > 0.f && p.y >= 0.f && scan.points[i - 1].x > 0.f && scan.points[i - 1].y < 0.f) {
-      if (sizes.size() == kMostRings) return std::nullopt;
-      sums.push_back(0.0);
-      sizes.push_back(0);
-      behind_seen = false;
+    if (behind_seen && p.x > 0.f && p.y >= 0.f && scan.points[i - 1].x > 0.f && scan.points[i - 1].y < 0.f) {
+      if (means.size() + 1 == kMostRings) return std::nullopt;
+      end_turn(i);
     }
-    labels[i] = static_cast<std::uint16_t>(sizes.size() - 1);
-    sums.back() += slope(p);
-    ++sizes.back();
+    labels[i] = static_cast<std::uint16_t>(means.size());
+    sum += elevations[i];
   }
+  end_turn(scan.points.size());
   constexpr std::size_t kFewestTurns = 8;
-  if (sizes.size() < kFewestTurns) return std::nullopt;
+  if (means.size() < kFewestTurns) return std::nullopt;
   std::size_t falling = 0;
-  for (std::size_t i = 1; i < sizes.size(); ++i)
-    falling += sums[i] / static_cast<double>(sizes[i]) < sums[i - 1] / static_cast<double>(sizes[i - 1]);
-  const double one_way = static_cast<double>(std::max(falling, sizes.size() - 1 - falling));
-  if (one_way < 0.9 * static_cast<double>(sizes.size() - 1)) return std::nullopt;
-  return number_by_elevation(scan, labels, sizes.size(), RingSource::kOrder);
+  for (std::size_t i = 1; i < means.size(); ++i) falling += means[i] < means[i - 1];
+  const double one_way = static_cast<double>(std::max(falling, means.size() - 1 - falling));
+  if (one_way < 0.9 * static_cast<double>(means.size() - 1)) return std::nullopt;
+  return number_by_elevation(elevations, labels, means.size(), RingSource::kOrder);
 }
 
 // Lines in the histogram of elevations: maxima that stand clear of the valleys beside them, and are no mere echo of a
@@ -103,16 +115,17 @@ std::vector<double> find_lines(const std::vector<double>& histogram) {
   return lines;
 }
 
-std::optional<Rings> rings_from_elevation(const Scan& scan) {
+std::optional<Rings> rings_from_elevation(const std::vector<float>& elevations) {
   constexpr double kBin_rad = 0.05 / 180.0 * kPi;
   constexpr std::size_t kBins = 3600;
   std::vector<double> histogram(kBins, 0.0);
-  std::vector<std::uint16_t> bin_of(scan.points.size());
-  for (std::size_t i = 0; i < scan.points.size(); ++i) {
-    const double elevation = std::atan(slope(scan.points[i]));
-    bin_of[i] = static_cast<std::uint16_t>(std::clamp((elevation + kPi / 2) / kBin_rad, 0.0, kBins - 1.0));
-    histogram[bin_of[i]] += 1.0;
+  std::vector<std::uint16_t> bin_of(elevations.size());
+  for (std::size_t i = 0; i < elevations.size(); ++i) {
+    const auto bin = static_cast<std::int32_t>((elevations[i] + static_cast<float>(kPi / 2)) *
+                                               static_cast<float>(1.0 / kBin_rad));
+    bin_of[i] = static_cast<std::uint16_t>(std::clamp<std::int32_t>(bin, 0, kBins - 1));
   }
+  for (const std::uint16_t bin : bin_of) histogram[bin] += 1.0;
   // A line on the border of two bins must not look like two lines.
   std::vector<double> smooth(kBins, 0.0);
   for (std::size_t i = 1; i + 1 < kBins; ++i) smooth[i] = histogram[i - 1] + 2.0 * histogram[i] + histogram[i + 1];
@@ -135,10 +148,10 @@ std::optional<Rings> rings_from_elevation(const Scan& scan) {
     if (std::abs(at - lines[nearest]) <= reach) near_points += histogram[bin];
   }
   constexpr double kShareNearLines = 0.8;  // 0.5 where elevations are spread evenly
-  if (near_points < kShareNearLines * static_cast<double>(scan.points.size())) return std::nullopt;
-  std::vector<std::uint16_t> labels(scan.points.size());
+  if (near_points < kShareNearLines * static_cast<double>(elevations.size())) return std::nullopt;
+  std::vector<std::uint16_t> labels(elevations.size());
   for (std::size_t i = 0; i < labels.size(); ++i) labels[i] = line_of_bin[bin_of[i]];
-  return number_by_elevation(scan, labels, lines.size(), RingSource::kElevation);
+  return number_by_elevation(elevations, labels, lines.size(), RingSource::kElevation);
 }
 
 }  // namespace
@@ -154,13 +167,14 @@ std::string to_string(RingSource source) {
 }
 
 Rings find_rings(const Scan& scan) {
+  const std::vector<float> elevations = elevations_of(scan);
   if (scan.rings.size() == scan.points.size() && !scan.rings.empty()) {
     const auto largest = *std::max_element(scan.rings.begin(), scan.rings.end());
-    return number_by_elevation(scan, scan.rings, std::size_t{largest} + 1, RingSource::kFile);
+    return number_by_elevation(elevations, scan.rings, std::size_t{largest} + 1, RingSource::kFile);
   }
   if (scan.points.size() < kFewestPoints) return {};
-  if (auto rings = rings_from_elevation(scan)) return *std::move(rings);
-  if (auto rings = rings_from_order(scan)) return *std::move(rings);
+  if (auto rings = rings_from_elevation(elevations)) return *std::move(rings);
+  if (auto rings = rings_from_order(scan, elevations)) return *std::move(rings);
   return {};
 }
 

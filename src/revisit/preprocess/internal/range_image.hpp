@@ -21,7 +21,4 @@ struct RangeImage {
 
 RangeImage make_range_image(const Scan& scan, const Rings& rings);
 
-/// atan2 within 1e-4 rad, in [-pi, pi]: enough to choose a column.
-float approximate_atan2(float y, float x);
-
 }  // namespace revisit::preprocess_internal
