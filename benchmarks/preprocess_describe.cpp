@@ -29,8 +29,8 @@ const Scan& bench_scan() {
       if (!read) std::fprintf(stderr, "%s\n", read.error().message.c_str()), std::exit(1);
       result = *std::move(read);
     } else {
-      result = testing_support::SyntheticWorld(5, 60.0, 120).scan(testing_support::SyntheticWorld::at(0, 0, 0),
-                                                                   {64, 2000, -24.8, 2.0});
+      result = testing_support::SyntheticWorld(5, 60.0, 120)
+                   .scan(testing_support::SyntheticWorld::at(0, 0, 0), {64, 2000, -24.8, 2.0});
     }
     const auto scale = estimate_intensity_scale(std::span<const Scan>(&result, 1), {});
     normalise_intensity(result, scale);
@@ -70,7 +70,8 @@ void filter_and_describe_plain(benchmark::State& state) {
     std::vector<bool> occupied(cells.size(), false);
     std::vector<Point> kept;
     for (const Point& p : bench_scan().points) {
-      const double range = std::sqrt(static_cast<double>(p.x) * p.x + static_cast<double>(p.y) * p.y + static_cast<double>(p.z) * p.z);
+      const double range =
+          std::sqrt(static_cast<double>(p.x) * p.x + static_cast<double>(p.y) * p.y + static_cast<double>(p.z) * p.z);
       if (range >= parameters.preprocess.min_range_m && range <= parameters.preprocess.max_range_m) kept.push_back(p);
     }
     for (const Point& p : kept) {
@@ -112,7 +113,8 @@ void ground_segmentation_plain(benchmark::State& state) {
     for (std::size_t i = 0; i < scan.points.size(); ++i) {
       const Point& p = scan.points[i];
       // A reader of rings from angles pays for both.
-      benchmark::DoNotOptimize(std::atan2(static_cast<double>(p.z), std::hypot(static_cast<double>(p.x), static_cast<double>(p.y))));
+      benchmark::DoNotOptimize(
+          std::atan2(static_cast<double>(p.z), std::hypot(static_cast<double>(p.x), static_cast<double>(p.y))));
       const double azimuth = std::atan2(static_cast<double>(p.y), static_cast<double>(p.x)) + kPi;
       const auto column = static_cast<std::size_t>(azimuth * static_cast<double>(columns) / (2.0 * kPi)) % columns;
       image[rings.of_point[i] * columns + column] = static_cast<std::int32_t>(i);
@@ -122,7 +124,8 @@ void ground_segmentation_plain(benchmark::State& state) {
         const auto a = image[row * columns + column], b = image[(row + 1) * columns + column];
         if (a < 0 || b < 0) continue;
         const Point &p = scan.points[static_cast<std::size_t>(a)], &q = scan.points[static_cast<std::size_t>(b)];
-        const double angle = std::atan2(static_cast<double>(q.z) - p.z, std::hypot(static_cast<double>(q.x) - p.x, static_cast<double>(q.y) - p.y));
+        const double angle = std::atan2(static_cast<double>(q.z) - p.z,
+                                        std::hypot(static_cast<double>(q.x) - p.x, static_cast<double>(q.y) - p.y));
         if (std::abs(to_degrees(angle)) <= parameters.preprocess.ground_slope_deg)
           is_ground[static_cast<std::size_t>(a)] = is_ground[static_cast<std::size_t>(b)] = 1;
       }

@@ -23,7 +23,8 @@ int main(int argc, char** argv) {
     if (!scan) return std::puts(scan.error().message.c_str()), 1;
     revisit::filter_range(*scan, parameters.preprocess);
     const auto ground = revisit::segment_ground(*scan, revisit::find_rings(*scan), parameters.preprocess);
-    const auto scale = revisit::estimate_intensity_scale(std::span<const revisit::Scan>(&*scan, 1), parameters.intensity);
+    const auto scale =
+        revisit::estimate_intensity_scale(std::span<const revisit::Scan>(&*scan, 1), parameters.intensity);
     revisit::normalise_intensity(*scan, scale);
     descriptors.push_back(revisit::describe(scan->points, parameters.descriptor));
     geometries.emplace_back(revisit::thin(scan->points, ground.is_ground, parameters.geometric.voxel_m));

@@ -14,7 +14,8 @@ int main(int argc, char** argv) {
   revisit::LoopDetector detector(revisit::Parameters{}, std::nullopt, {}, print);
   for (std::size_t i = 0; i < (*recording)->size(); ++i) {
     auto scan = (*recording)->read(i);
-    const auto detection = scan ? detector.process(*std::move(scan)) : revisit::Result<revisit::Detection>(scan.error());
+    const auto detection =
+        scan ? detector.process(*std::move(scan)) : revisit::Result<revisit::Detection>(scan.error());
     if (!detection) {
       std::puts(detection.error().message.c_str());  // this scan is of no use; go on with the next
       continue;

@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
   if (!detection) return std::puts(detection.error().message.c_str()), 1;
   if (!detection->loop) return std::printf("not the same place: %s\n", detection->reason.c_str()), 0;
   const auto& T = detection->loop->T_match_query;
-  std::printf("the same place: the later scan stands at (%.2f, %.2f, %.2f) m and heads %.1f degrees in the earlier one\n",
-              T.translation().x(), T.translation().y(), T.translation().z(), revisit::to_degrees(revisit::yaw_of(T)));
+  std::printf(
+      "the same place: the later scan stands at (%.2f, %.2f, %.2f) m and heads %.1f degrees in the earlier one\n",
+      T.translation().x(), T.translation().y(), T.translation().z(), revisit::to_degrees(revisit::yaw_of(T)));
 }

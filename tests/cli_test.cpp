@@ -93,7 +93,8 @@ TEST(Cli, HelpTeachesAndWrongUseIsCode2) {
 TEST(Cli, AWrongParameterIsNamedWithItsAllowedRange) {
   const Outcome outcome = run("detect /tmp --out /tmp/x --descriptor.rings 9999");
   EXPECT_EQ(outcome.code, 2);
-  EXPECT_NE(outcome.output.find("descriptor.rings = 9999 is not allowed; allowed: a whole number, 1 to 512"), std::string::npos)
+  EXPECT_NE(outcome.output.find("descriptor.rings = 9999 is not allowed; allowed: a whole number, 1 to 512"),
+            std::string::npos)
       << outcome.output;
   const fs::path file = fresh_folder() / "p.toml";
   std::ofstream(file) << "[retrieval]\ntopk = 3\n";
@@ -153,10 +154,12 @@ TEST(Cli, RecordingsOfNoUseFailWithAMessage) {
     const fs::path recording = folder / each.name;
     fs::create_directories(recording);
     for (int i = 0; i < 3; ++i) write_scan(recording, i, each.points);
-    const Outcome outcome = run("detect " + recording.string() + " --out " + (folder / "out").string() + " --overwrite");
+    const Outcome outcome =
+        run("detect " + recording.string() + " --out " + (folder / "out").string() + " --overwrite");
     EXPECT_EQ(outcome.code, 1) << each.name << ": " << outcome.output;
     EXPECT_NE(outcome.output.find(each.message), std::string::npos) << outcome.output;
-    EXPECT_EQ(run("describe " + (recording / "000000.bin").string() + " " + (folder / "a.png").string()).code, 1) << each.name;
+    EXPECT_EQ(run("describe " + (recording / "000000.bin").string() + " " + (folder / "a.png").string()).code, 1)
+        << each.name;
   }
   EXPECT_NE(run("detect /no/such --out /tmp/x").output.find("/no/such: no such folder"), std::string::npos);
   fs::create_directories(folder / "nothing");
@@ -170,7 +173,8 @@ TEST(Cli, EqualIntensitiesAreToldAndGeometryServes) {
   const fs::path folder = fresh_folder(), recording = there_and_back(folder / "recording");
   for (const auto& entry : fs::directory_iterator(recording / "velodyne")) {
     std::vector<Point> points(fs::file_size(entry) / sizeof(Point));
-    std::ifstream(entry.path(), std::ios::binary).read(reinterpret_cast<char*>(points.data()), static_cast<std::streamsize>(points.size() * sizeof(Point)));
+    std::ifstream(entry.path(), std::ios::binary)
+        .read(reinterpret_cast<char*>(points.data()), static_cast<std::streamsize>(points.size() * sizeof(Point)));
     for (Point& p : points) p.intensity = 7.f;
     write_points(entry.path(), points);
   }
@@ -187,9 +191,11 @@ TEST(Cli, AFullDiskIsToldNotIgnored) {
     fs::remove_all(out);
     fs::create_directories(out);
     fs::create_symlink("/dev/full", out / name);
-    const Outcome outcome = run("detect " + recording.string() + " --overwrite --out " + out.string() + kShortExclusion);
+    const Outcome outcome =
+        run("detect " + recording.string() + " --overwrite --out " + out.string() + kShortExclusion);
     EXPECT_EQ(outcome.code, 1) << name << ": " << outcome.output;
-    EXPECT_NE(outcome.output.find(std::string(name) + ": cannot be written: No space left on device"), std::string::npos)
+    EXPECT_NE(outcome.output.find(std::string(name) + ": cannot be written: No space left on device"),
+              std::string::npos)
         << outcome.output;
   }
   EXPECT_EQ(run("describe " + (recording / "velodyne" / "000000.bin").string() + " /dev/full").code, 1);
@@ -260,7 +266,8 @@ TEST(Cli, DescribeDrawsAndInfoTells) {
   EXPECT_EQ(content(folder / "a.png").substr(1, 3), "PNG");
   const Outcome info = run("info " + recording.string());
   EXPECT_EQ(info.code, 0) << info.output;
-  for (const char* fact : {"KITTI odometry folder", "scans        12", "poses        12", "rate         1.00 Hz", "rings        32"})
+  for (const char* fact :
+       {"KITTI odometry folder", "scans        12", "poses        12", "rate         1.00 Hz", "rings        32"})
     EXPECT_NE(info.output.find(fact), std::string::npos) << fact << "\n" << info.output;
   EXPECT_EQ(run("info " + scan).code, 0);
   EXPECT_EQ(run("info /no/such.bin").code, 1);
@@ -271,10 +278,14 @@ TEST(Cli, CalibrateLearnsAndDetectApplies) {
   const Outcome learn = run("calibrate " + recording.string() + " --out " + phi.string());
   ASSERT_EQ(learn.code, 0) << learn.output;
   EXPECT_NE(learn.output.find("disagreement"), std::string::npos);
-  const Outcome apply = run("detect " + recording.string() + " --out " + (folder / "out").string() + " --calibration " + phi.string());
+  const Outcome apply =
+      run("detect " + recording.string() + " --out " + (folder / "out").string() + " --calibration " + phi.string());
   EXPECT_EQ(apply.code, 0) << apply.output;
   std::ofstream(phi) << "{}";
-  EXPECT_EQ(run("describe " + (recording / "velodyne" / "000000.bin").string() + " " + (folder / "a.png").string() + " --calibration " + phi.string()).code, 1);
+  EXPECT_EQ(run("describe " + (recording / "velodyne" / "000000.bin").string() + " " + (folder / "a.png").string() +
+                " --calibration " + phi.string())
+                .code,
+            1);
 }
 
 TEST(CliOnRealScans, WhatTheProjectMustShow) {
@@ -282,7 +293,10 @@ TEST(CliOnRealScans, WhatTheProjectMustShow) {
   const fs::path folder = fresh_folder();
   const std::string raw = (shared_data() / "kitti_raw_0005").string();
   // Ten frames apart every scan has a neighbour 3 to 4.5 m behind: each accepted loop must agree with GPS/IMU.
-  ASSERT_EQ(run("detect " + raw + " --out " + (folder / "raw").string() + " --retrieval.exclude_frames 10 --retrieval.exclude_s 1").code, 0);
+  ASSERT_EQ(run("detect " + raw + " --out " + (folder / "raw").string() +
+                " --retrieval.exclude_frames 10 --retrieval.exclude_s 1")
+                .code,
+            0);
   const Outcome evaluate = run("evaluate " + (folder / "raw").string() + " --reference " + raw);
   ASSERT_EQ(evaluate.code, 0) << evaluate.output;
   const std::string figures = content(folder / "raw" / "evaluation.json");

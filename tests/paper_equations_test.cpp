@@ -23,12 +23,13 @@ constexpr double kTurn = 2.0 * 3.14159265358979323846;
 
 struct PageDescriptor {
   int Nr, Ns;
-  std::vector<std::vector<double>> omega;       // [i][j], eq. 5; 8-bit steps as decided
-  std::vector<std::vector<bool>> occupied;      // decided: a hit is a hit, whatever its intensity (eq. 6)
+  std::vector<std::vector<double>> omega;   // [i][j], eq. 5; 8-bit steps as decided
+  std::vector<std::vector<bool>> occupied;  // decided: a hit is a hit, whatever its intensity (eq. 6)
 };
 
 PageDescriptor describe_by_the_page(const std::vector<Point>& P, int Nr, int Ns, double Lmax) {
-  PageDescriptor d{Nr, Ns, std::vector(static_cast<std::size_t>(Nr), std::vector<double>(static_cast<std::size_t>(Ns), 0.0)),
+  PageDescriptor d{Nr, Ns,
+                   std::vector(static_cast<std::size_t>(Nr), std::vector<double>(static_cast<std::size_t>(Ns), 0.0)),
                    std::vector(static_cast<std::size_t>(Nr), std::vector<bool>(static_cast<std::size_t>(Ns), false))};
   for (const Point& p : P) {
     const double rho = std::sqrt(static_cast<double>(p.x) * p.x + static_cast<double>(p.y) * p.y);  // eq. 2
@@ -92,9 +93,11 @@ void expect_equal(const std::vector<Point>& query, const std::vector<Point>& can
   const PageDescriptor q = describe_by_the_page(query, Nr, Ns, Lmax), c = describe_by_the_page(candidate, Nr, Ns, Lmax);
   for (int i = 0; i < Nr; ++i)
     for (int j = 0; j < Ns; ++j) {
-      ASSERT_EQ(fast_q.occupied(i, j), q.occupied[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)]) << i << " " << j;
+      ASSERT_EQ(fast_q.occupied(i, j), q.occupied[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)])
+          << i << " " << j;
       ASSERT_EQ(fast_q.intensity[static_cast<std::size_t>(j * Nr + i)],
-                std::lround(255.0 * q.omega[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)])) << i << " " << j;
+                std::lround(255.0 * q.omega[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)]))
+          << i << " " << j;
     }
   const LoopCandidate fast = match_descriptors(fast_q, fast_c);
   const auto [phi_g, k] = geometry_by_the_page(q, c);

@@ -17,8 +17,8 @@ inline std::filesystem::path shared_data() {
 /// An empty folder of this test's own.
 inline std::filesystem::path fresh_folder() {
   const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-  const auto folder =
-      std::filesystem::path(testing::TempDir()) / "revisit" / (std::string(test->test_suite_name()) + "." + test->name());
+  const auto folder = std::filesystem::path(testing::TempDir()) / "revisit" /
+                      (std::string(test->test_suite_name()) + "." + test->name());
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
   return folder;
@@ -27,6 +27,6 @@ inline std::filesystem::path fresh_folder() {
 }  // namespace revisit::testing_support
 
 /// Skips the test where the real recordings are not there: they are under other licences and not part of the project.
-#define REVISIT_NEEDS_SHARED_DATA()                                                       \
-  if (!std::filesystem::exists(revisit::testing_support::shared_data()))                   \
+#define REVISIT_NEEDS_SHARED_DATA()                                      \
+  if (!std::filesystem::exists(revisit::testing_support::shared_data())) \
   GTEST_SKIP() << "needs the recordings of " << revisit::testing_support::shared_data()

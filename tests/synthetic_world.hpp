@@ -34,7 +34,8 @@ class SyntheticWorld {
     bool with_rings = false;
   };
 
-  /// A scan from T_world_lidar (z of the ground is 0), points ring after ring from straight ahead, as KITTI stores them.
+  /// A scan from T_world_lidar (z of the ground is 0), points ring after ring from straight ahead, as KITTI stores
+  /// them.
   Scan scan(const Pose& T_world_lidar, const Sensor& sensor, unsigned seed = 1) const {
     Scan result;
     std::mt19937 random(seed);
@@ -78,7 +79,9 @@ class SyntheticWorld {
     if (direction.z() < -1e-9) {
       nearest = -origin.z() / direction.z();
       const Eigen::Vector3d p = origin + nearest * direction;
-      reflectance = (static_cast<long>(std::floor(p.x() / 4.0)) + static_cast<long>(std::floor(p.y() / 4.0))) % 2 == 0 ? 0.2 : 0.3;
+      reflectance = (static_cast<long>(std::floor(p.x() / 4.0)) + static_cast<long>(std::floor(p.y() / 4.0))) % 2 == 0
+                        ? 0.2
+                        : 0.3;
     }
     for (const Box& box : boxes_) {
       const Eigen::Array3d a = (box.low - origin).array() / direction.array();

@@ -45,7 +45,8 @@ int calibrate(const Options& options) {
     std::printf("%zu rings, gains %.3f to %.3f\n", phi.ring_gains.size(), *least, *most);
   }
   std::printf(
-      "disagreement of %zu surface patches (half of them not learnt from): %.4f before, %.4f after (%.1f %% less)\n%s\n",
+      "disagreement of %zu surface patches (half of them not learnt from): %.4f before, %.4f after (%.1f %% "
+      "less)\n%s\n",
       report->patches, report->disagreement_before, report->disagreement_after,
       100.0 * (1.0 - report->disagreement_after / report->disagreement_before), options.out.c_str());
   return kDone;
@@ -64,7 +65,9 @@ Run add_calibrate(CLI::App& program) {
       "Example: revisit calibrate kitti/sequences/00 --out hdl64.json");
   command->add_option("recording", options->input, "Recording of a moving sensor")->required();
   command->add_option("--out", options->out, "The calibration to write, .json")->required();
-  command->add_option("--scans", options->scans, "Learn from the first scans only")->capture_default_str()->check(CLI::Range(2, 200));
+  command->add_option("--scans", options->scans, "Learn from the first scans only")
+      ->capture_default_str()
+      ->check(CLI::Range(2, 200));
   options->parameters.add_to(*command);
   return [options] { return calibrate(*options); };
 }

@@ -34,13 +34,15 @@ void ParameterFlags::add_to(CLI::App& command) {
   std::string presets;
   for (const auto& name : preset_names()) presets += (presets.empty() ? "" : ", ") + name;
   command.add_option("--preset", preset_, "Parameters to start from: " + presets)->capture_default_str();
-  command.add_option("--parameters", file_, "TOML file of parameters, over the preset (`revisit parameters` prints one)");
+  command.add_option("--parameters", file_,
+                     "TOML file of parameters, over the preset (`revisit parameters` prints one)");
   for (const ParameterInfo& info : parameter_infos()) {
-    const std::string range = info.is_switch ? "true or false"
-                                             : CLI::detail::to_string(info.min) + " to " + CLI::detail::to_string(info.max);
-    command.add_option_function<std::string>(
-               "--" + info.name, [this, name = info.name](const std::string& value) { values_[name] = value; },
-               info.help + " [" + info.default_value + "; " + range + "]")
+    const std::string range =
+        info.is_switch ? "true or false" : CLI::detail::to_string(info.min) + " to " + CLI::detail::to_string(info.max);
+    command
+        .add_option_function<std::string>(
+            "--" + info.name, [this, name = info.name](const std::string& value) { values_[name] = value; },
+            info.help + " [" + info.default_value + "; " + range + "]")
         ->type_name("")
         ->group("Parameters [default; allowed], over the file");
   }

@@ -29,10 +29,14 @@ void count(RunFile& run, const Detection& detection) {
   run.counts["points"] += detection.points;
   run.counts["ground_points"] += detection.ground_points;
   const auto& ms = detection.preparation_ms;
-  for (const auto& [stage, value] :
-       {std::pair{"filter", ms.filter}, {"ground", ms.ground}, {"intensity", ms.intensity}, {"describe", ms.describe},
-        {"thin", ms.thin}, {"search", detection.search_ms}, {"temporal", detection.temporal_ms},
-        {"geometric", detection.geometric_ms}})
+  for (const auto& [stage, value] : {std::pair{"filter", ms.filter},
+                                     {"ground", ms.ground},
+                                     {"intensity", ms.intensity},
+                                     {"describe", ms.describe},
+                                     {"thin", ms.thin},
+                                     {"search", detection.search_ms},
+                                     {"temporal", detection.temporal_ms},
+                                     {"geometric", detection.geometric_ms}})
     run.ms_total[stage] += value;
 }
 
@@ -54,7 +58,8 @@ Status learn_database(LoopDetector& detector, const Recording& database, RunFile
   Progress progress("learn", "scans", database.size());
   for (std::size_t i = 0; i < database.size() && !interrupted(); ++i) {
     auto scan = database.read(i);
-    const Status status = scan ? detector.add(*std::move(scan), database.trajectory().at(database.frame(i))) : scan.error();
+    const Status status =
+        scan ? detector.add(*std::move(scan), database.trajectory().at(database.frame(i))) : scan.error();
     if (!status) skip(run, progress, status.error());
     progress.update(i + 1);
   }
@@ -69,9 +74,10 @@ Status detect_all(LoopDetector& detector, const Recording& recording, ResultWrit
     Stopwatch watch;
     auto scan = recording.read(i);
     run.ms_total["read"] += watch.lap_ms();
-    auto detection = !scan                 ? Result<Detection>(scan.error())
-                     : run.database.empty() ? detector.process(*std::move(scan), recording.trajectory().at(recording.frame(i)))
-                                            : detector.localise(*std::move(scan));
+    auto detection = !scan ? Result<Detection>(scan.error())
+                     : run.database.empty()
+                         ? detector.process(*std::move(scan), recording.trajectory().at(recording.frame(i)))
+                         : detector.localise(*std::move(scan));
     if (!detection) {
       skip(run, progress, detection.error());
     } else {
@@ -151,7 +157,8 @@ Run add_detect(CLI::App& program) {
       "  poses.txt/.tum  the poses that came with the recording, if any\n"
       "  run.json        version, parameters, counts, milliseconds a stage\n\n"
       "Example: revisit detect kitti/sequences/00 --out results/00");
-  command->add_option("input", options->input, "Recording: KITTI folder, KITTI raw drive, or folder of scans")->required();
+  command->add_option("input", options->input, "Recording: KITTI folder, KITTI raw drive, or folder of scans")
+      ->required();
   command->add_option("--out", options->out, "Folder for the results")->required();
   command->add_option("--database", options->database,
                       "Look for the scans of the recording in this other one (a map) instead of in its own past");

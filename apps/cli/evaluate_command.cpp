@@ -38,7 +38,9 @@ Result<Trajectory> load_reference(const Options& options, const Recording* recor
   std::optional<Pose> T_camera_lidar;
   if (poses->format == PoseFormat::kKitti) {
     const fs::path beside = fs::path(options.reference).parent_path() / "calib.txt";
-    const std::string file = !options.calibration.empty() ? options.calibration : fs::exists(beside) ? beside.string() : "";
+    const std::string file = !options.calibration.empty() ? options.calibration
+                             : fs::exists(beside)         ? beside.string()
+                                                          : "";
     if (!file.empty()) {
       const auto calibration = read_camera_calibration(file);
       if (!calibration) return calibration.error();
@@ -104,7 +106,8 @@ int evaluate(const Options& options) {
   report.results = options.results;
   report.reference = options.reference;
   // The same frames must be allowed here as were searched.
-  report.rules.exclude_frames = options.exclude_frames.value_or(facts.exclude_frames.value_or(report.rules.exclude_frames));
+  report.rules.exclude_frames =
+      options.exclude_frames.value_or(facts.exclude_frames.value_or(report.rules.exclude_frames));
   report.rules.exclude_s = options.exclude_s.value_or(facts.exclude_s.value_or(report.rules.exclude_s));
   const auto trajectory = load_reference(options, recording.get());
   if (!trajectory) return fail(trajectory.error());
@@ -132,16 +135,20 @@ Run add_evaluate(CLI::App& program) {
       "Prints table 1 (retrieval) and table 2 (loop constraints), and writes into DIR: report.html,\n"
       "precision_recall.png, trajectory.png, evaluation.json. Works on the files of any program that writes\n"
       "candidates.csv and loops.csv (docs/formats.md).\n\n"
-      "Example: revisit evaluate results/00 --reference kitti/poses/00.txt --camera-calibration kitti/sequences/00/calib.txt");
+      "Example: revisit evaluate results/00 --reference kitti/poses/00.txt --camera-calibration "
+      "kitti/sequences/00/calib.txt");
   command->add_option("results", options->results, "Folder that `revisit detect` wrote")->required();
-  command->add_option("--reference", options->reference,
-                      "Reference poses: a KITTI, TUM or g2o file, or a recording that has poses")
+  command
+      ->add_option("--reference", options->reference,
+                   "Reference poses: a KITTI, TUM or g2o file, or a recording that has poses")
       ->required();
   command->add_option("--recording", options->recording, "The recording, where it is not where run.json says");
   command->add_option("--camera-calibration", options->calibration,
                       "calib.txt with the row Tr, for poses of a KITTI camera (default: beside the poses)");
-  command->add_option("--exclude-frames", options->exclude_frames, "Frames a match must be older (default: as searched, else 50)");
-  command->add_option("--exclude-s", options->exclude_s, "Seconds a match must be older (default: as searched, else 30)");
+  command->add_option("--exclude-frames", options->exclude_frames,
+                      "Frames a match must be older (default: as searched, else 50)");
+  command->add_option("--exclude-s", options->exclude_s,
+                      "Seconds a match must be older (default: as searched, else 30)");
   return [options] { return evaluate(*options); };
 }
 

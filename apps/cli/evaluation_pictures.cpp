@@ -57,6 +57,17 @@ Status draw_trajectory(const std::filesystem::path& file, const Reference& refer
   chart.draw_axes("trajectory from above, light to dark as time goes", "x (m)", "y (m)");
   const auto at = [&](const Pose& T) { return chart.at(T.translation().x(), T.translation().y()); };
 
+  // Right loops lie under the trajectory as a red band, false ones over it.
+  const auto draw_loops = [&](bool right) {
+    for (const JudgedLoop& loop : loops.loops) {
+      if (loop.right != right) continue;
+      const Pixel query = at(*reference.trajectory().at(loop.query)),
+                  match = at(*reference.trajectory().at(loop.match));
+      canvas.line({match, query}, right ? kLoop : kFalse, right ? 4.0 : 1.5);
+      canvas.dot(query, right ? 6.0 : 4.0, right ? kLoop : kFalse);
+    }
+  };
+  draw_loops(true);
   // Segments between frames that follow each other; a gap in the recording stays a gap.
   std::size_t index = 0;
   const Pose* before = nullptr;
@@ -66,15 +77,10 @@ Status draw_trajectory(const std::filesystem::path& file, const Reference& refer
     const Colour colour{0.80 - 0.75 * t, 0.88 - 0.70 * t, 1.0 - 0.55 * t};
     if (before != nullptr && (before->translation() - entry.T_world_lidar.translation()).norm() < kLongestStep_m)
       canvas.line({at(*before), at(entry.T_world_lidar)}, colour, 3);
-    canvas.dot(at(entry.T_world_lidar), 2, colour);
+    canvas.dot(at(entry.T_world_lidar), 2.5, colour);
     before = &entry.T_world_lidar;
   }
-  for (const JudgedLoop& loop : loops.loops) {
-    const Pixel query = at(*reference.trajectory().at(loop.query)), match = at(*reference.trajectory().at(loop.match));
-    canvas.line({match, query}, loop.right ? kLoop : kFalse, 1.5);
-    canvas.dot(query, 4, loop.right ? kLoop : kFalse);
-    canvas.dot(match, 2.5, loop.right ? kLoop : kFalse);
-  }
+  draw_loops(false);
   char text[160];
   std::snprintf(text, sizeof text, "%zu frames, %zu revisits, %zu accepted loops (red), %zu of them false (black)",
                 entries.size(), loops.revisits, loops.accepted, loops.false_loops);

@@ -10,10 +10,11 @@
 
 namespace revisit::cli {
 
-Status draw_precision_recall(const std::filesystem::path& file, const RetrievalTable& all, const RetrievalTable& reverse);
+Status draw_precision_recall(const std::filesystem::path& file, const RetrievalTable& all,
+                             const RetrievalTable& reverse);
 
-/// The reference trajectory from above, light to dark as time goes, revisits thickened, right loops red and false ones
-/// crossed in black with a line to their match.
+/// The reference trajectory from above, light to dark as time goes; right loops red below it, false ones black above
+/// it, each with a line to its match.
 Status draw_trajectory(const std::filesystem::path& file, const Reference& reference, const LoopTable& loops);
 
 }  // namespace revisit::cli

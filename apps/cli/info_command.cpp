@@ -48,8 +48,8 @@ int info_of_recording(const std::string& folder, const Parameters& parameters) {
   const Recording& recording = **opened;
   const std::size_t last = recording.size() - 1;
   std::printf("recording    %s (%s)\n", folder.c_str(), recording.kind().c_str());
-  std::printf("scans        %zu, frames %lld to %lld\n", recording.size(), static_cast<long long>(recording.frame(0).value),
-              static_cast<long long>(recording.frame(last).value));
+  std::printf("scans        %zu, frames %lld to %lld\n", recording.size(),
+              static_cast<long long>(recording.frame(0).value), static_cast<long long>(recording.frame(last).value));
   const double span_s = recording.stamp_s(last) - recording.stamp_s(0);
   const auto frames = static_cast<double>(recording.frame(last).value - recording.frame(0).value);
   if (!recording.has_times())

@@ -44,12 +44,12 @@ Table table_2(const EvaluationReport& report) {
   const auto error = [&](double value, const char* unit) {
     return t.accepted == 0 ? std::string("-") : format("%.3f %s", value, unit);
   };
-  return {{"accepted", "false loops", "precision", "recall", "reverse recall", "translation median", "95 %",
-           "rotation median", "95 %"},
-          {std::to_string(t.accepted), std::to_string(t.false_loops),
-           t.accepted == 0 ? "-" : format("%.3f", t.precision), recall(t.recall, t.revisits),
-           recall(t.reverse_recall, t.reverse_revisits), error(t.median_translation_m, "m"),
-           error(t.p95_translation_m, "m"), error(t.median_rotation_deg, "deg"), error(t.p95_rotation_deg, "deg")}};
+  return {
+      {"accepted", "false loops", "precision", "recall", "reverse recall", "translation median", "95 %",
+       "rotation median", "95 %"},
+      {std::to_string(t.accepted), std::to_string(t.false_loops), t.accepted == 0 ? "-" : format("%.3f", t.precision),
+       recall(t.recall, t.revisits), recall(t.reverse_recall, t.reverse_revisits), error(t.median_translation_m, "m"),
+       error(t.p95_translation_m, "m"), error(t.median_rotation_deg, "deg"), error(t.p95_rotation_deg, "deg")}};
 }
 
 std::string to_text(const Table& table) {
@@ -95,9 +95,12 @@ std::string to_text(const EvaluationReport& report) {
 
 std::string to_json(const EvaluationReport& report) {
   const auto retrieval = [](const RetrievalTable& t) {
-    return nlohmann::ordered_json{{"revisits", t.revisits},       {"answers", t.answers},
-                                  {"right", t.right},             {"recall_at_1", t.recall_at_1},
-                                  {"f1_max", t.f1_max},           {"average_precision", t.average_precision},
+    return nlohmann::ordered_json{{"revisits", t.revisits},
+                                  {"answers", t.answers},
+                                  {"right", t.right},
+                                  {"recall_at_1", t.recall_at_1},
+                                  {"f1_max", t.f1_max},
+                                  {"average_precision", t.average_precision},
                                   {"recall_at_p100", t.recall_at_p100},
                                   {"extended_precision", t.extended_precision}};
   };

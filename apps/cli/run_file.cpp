@@ -10,17 +10,23 @@
 namespace revisit::cli {
 
 Status write_run(const std::filesystem::path& file, const RunFile& run) {
-  nlohmann::ordered_json document = {{"program", "revisit"},       {"version", REVISIT_VERSION},
-                                     {"command", run.command},     {"input", run.input},
-                                     {"database", run.database},   {"interrupted", run.interrupted},
+  nlohmann::ordered_json document = {{"program", "revisit"},
+                                     {"version", REVISIT_VERSION},
+                                     {"command", run.command},
+                                     {"input", run.input},
+                                     {"database", run.database},
+                                     {"interrupted", run.interrupted},
                                      {"parameters", nlohmann::ordered_json::object()}};
   for (const ParameterInfo& info : parameter_infos()) {
     const std::string value = get_parameter(run.parameters, info.name);
     document["parameters"][info.name] = nlohmann::ordered_json::parse(value);
   }
-  document["intensity"] = {{"min", run.intensity.min_raw},       {"median", run.intensity.median_raw},
-                           {"max", run.intensity.max_raw},       {"full_scale", run.intensity.full_scale},
-                           {"is_reflectance", run.intensity.is_reflectance}, {"warning", run.intensity.warning}};
+  document["intensity"] = {{"min", run.intensity.min_raw},
+                           {"median", run.intensity.median_raw},
+                           {"max", run.intensity.max_raw},
+                           {"full_scale", run.intensity.full_scale},
+                           {"is_reflectance", run.intensity.is_reflectance},
+                           {"warning", run.intensity.warning}};
   document["counts"] = run.counts;
   const auto found = run.counts.find("scans");
   const double scans = found == run.counts.end() ? 0.0 : static_cast<double>(found->second);
@@ -41,7 +47,8 @@ Result<RunFacts> read_run(const std::filesystem::path& file) {
     const auto parameters = document.value("parameters", nlohmann::json::object());
     if (parameters.contains("retrieval.exclude_frames"))
       facts.exclude_frames = parameters.at("retrieval.exclude_frames").get<int>();
-    if (parameters.contains("retrieval.exclude_s")) facts.exclude_s = parameters.at("retrieval.exclude_s").get<double>();
+    if (parameters.contains("retrieval.exclude_s"))
+      facts.exclude_s = parameters.at("retrieval.exclude_s").get<double>();
   } catch (const nlohmann::json::exception& problem) {
     return Error{file.string() + ": " + problem.what()};
   }

@@ -19,8 +19,8 @@ struct RunFile {
   Parameters parameters;
   IntensityScale intensity;
   std::map<std::string, std::size_t> counts;
-  std::map<std::string, double> ms_total;    ///< by stage, over all scans
-  std::vector<std::string> skipped;          ///< why each scan was left out
+  std::map<std::string, double> ms_total;  ///< by stage, over all scans
+  std::vector<std::string> skipped;        ///< why each scan was left out
   bool interrupted = false;
 };
 

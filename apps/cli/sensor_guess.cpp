@@ -18,12 +18,12 @@ struct KnownSensor {
 
 // From the makers' data sheets; the nearest vertical field of view among those with as many rings wins.
 constexpr std::array kKnown = {
-    KnownSensor{16, -15.0, 15.0, "VLP-16"},           KnownSensor{32, -30.67, 10.67, "HDL-32E"},
-    KnownSensor{32, -25.0, 15.0, "VLP-32C"},          KnownSensor{40, -16.0, 7.0, "Pandar40"},
-    KnownSensor{64, -24.8, 2.0, "HDL-64E"},           KnownSensor{64, -25.0, 15.0, "Pandar64"},
-    KnownSensor{64, -16.6, 16.6, "OS1-64"},           KnownSensor{64, -45.0, 45.0, "OS0-64"},
-    KnownSensor{64, -22.5, 22.5, "OS1-64 (rev. C)"},  KnownSensor{128, -25.0, 15.0, "VLS-128"},
-    KnownSensor{128, -45.0, 45.0, "OS0-128"},         KnownSensor{128, -22.5, 22.5, "OS1-128"},
+    KnownSensor{16, -15.0, 15.0, "VLP-16"},          KnownSensor{32, -30.67, 10.67, "HDL-32E"},
+    KnownSensor{32, -25.0, 15.0, "VLP-32C"},         KnownSensor{40, -16.0, 7.0, "Pandar40"},
+    KnownSensor{64, -24.8, 2.0, "HDL-64E"},          KnownSensor{64, -25.0, 15.0, "Pandar64"},
+    KnownSensor{64, -16.6, 16.6, "OS1-64"},          KnownSensor{64, -45.0, 45.0, "OS0-64"},
+    KnownSensor{64, -22.5, 22.5, "OS1-64 (rev. C)"}, KnownSensor{128, -25.0, 15.0, "VLS-128"},
+    KnownSensor{128, -45.0, 45.0, "OS0-128"},        KnownSensor{128, -22.5, 22.5, "OS1-128"},
 };
 
 }  // namespace

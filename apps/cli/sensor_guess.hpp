@@ -10,7 +10,7 @@ namespace revisit::cli {
 
 /// What a scan says of its sensor.
 struct SensorGuess {
-  std::string name;  ///< e.g. "HDL-64E or alike"
+  std::string name;                            ///< e.g. "HDL-64E or alike"
   double lowest_deg = 0.0, highest_deg = 0.0;  ///< elevation of the lowest and highest point
   double horizontal_deg = 0.0;                 ///< azimuth that is covered
 };

@@ -18,8 +18,8 @@ size_t revisit_bits_words(uint32_t cells);
 /* The smallest number of differing cells over all shifts k in [0, sectors) of the query's columns
  * (column j of the query laid on column j + k of the candidate); the first shift that reaches it is stored
  * in *best_shift. Both images have rings * sectors >= 1 cells. */
-uint32_t revisit_bits_min_hamming(const uint64_t* query, const uint64_t* candidate, uint32_t rings,
-                                  uint32_t sectors, uint32_t* best_shift);
+uint32_t revisit_bits_min_hamming(const uint64_t* query, const uint64_t* candidate, uint32_t rings, uint32_t sectors,
+                                  uint32_t* best_shift);
 
 #ifdef __cplusplus
 }

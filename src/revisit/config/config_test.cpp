@@ -90,7 +90,8 @@ TEST(ParameterReference, PageInDocsIsUpToDate) {
   std::ifstream file(std::string(REVISIT_SOURCE_DIR) + "/docs/parameters.md");
   std::stringstream page;
   page << file.rdbuf();
-  EXPECT_EQ(page.str(), parameter_reference_markdown()) << "run: build/revisit parameters --markdown > docs/parameters.md";
+  EXPECT_EQ(page.str(), parameter_reference_markdown())
+      << "run: build/revisit parameters --markdown > docs/parameters.md";
 }
 
 }  // namespace

@@ -34,11 +34,12 @@ std::string to_toml(const Parameters& parameters) {
 
 std::string parameter_reference_markdown() {
   std::ostringstream page;
-  page << "# Parameters\n\n"
-          "Made by `revisit parameters --markdown`; do not edit by hand. Each is a flag (`--retrieval.top_k 10`) and a\n"
-          "line of a parameter file (`--parameters FILE`, TOML with one table a section). `revisit parameters` prints\n"
-          "such a file. The unit stands at the end of the name: `_m` metres, `_s` seconds, `_deg` degrees.\n\n"
-          "| parameter | default |";
+  page
+      << "# Parameters\n\n"
+         "Made by `revisit parameters --markdown`; do not edit by hand. Each is a flag (`--retrieval.top_k 10`) and a\n"
+         "line of a parameter file (`--parameters FILE`, TOML with one table a section). `revisit parameters` prints\n"
+         "such a file. The unit stands at the end of the name: `_m` metres, `_s` seconds, `_deg` degrees.\n\n"
+         "| parameter | default |";
   const std::vector<std::string> presets = preset_names();
   for (std::size_t i = 1; i < presets.size(); ++i) page << " " << presets[i] << " |";
   page << " allowed | meaning |\n|---|---|";

@@ -201,9 +201,9 @@ Status validate(const Parameters& parameters) {
     if (!status) return status;
   }
   if (parameters.preprocess.min_range_m >= parameters.preprocess.max_range_m)
-    return Error{"preprocess.min_range_m = " + to_text(parameters.preprocess.min_range_m) +
-                 " is not allowed; allowed: less than preprocess.max_range_m = " +
-                 to_text(parameters.preprocess.max_range_m)};
+    return Error{
+        "preprocess.min_range_m = " + to_text(parameters.preprocess.min_range_m) +
+        " is not allowed; allowed: less than preprocess.max_range_m = " + to_text(parameters.preprocess.max_range_m)};
   return ok();
 }
 

@@ -11,35 +11,35 @@ namespace revisit {
 
 /// Range and ground filters in front of the descriptor (paper, section III-A).
 struct PreprocessOptions {
-  double min_range_m = 1.0;           ///< nearer returns are the vehicle itself
-  double max_range_m = 80.0;          ///< farther returns are noise
-  bool remove_ground = false;         ///< describe the scan without its ground
-  double ground_slope_deg = 10.0;     ///< steepest slope between vertical neighbours that is still ground
-  int ground_min_segment_points = 30; ///< smaller flat patches (car roofs) are not ground
+  double min_range_m = 1.0;            ///< nearer returns are the vehicle itself
+  double max_range_m = 80.0;           ///< farther returns are noise
+  bool remove_ground = false;          ///< describe the scan without its ground
+  double ground_slope_deg = 10.0;      ///< steepest slope between vertical neighbours that is still ground
+  int ground_min_segment_points = 30;  ///< smaller flat patches (car roofs) are not ground
 };
 
 /// How raw intensity becomes [0, 1], decided once a recording.
 struct IntensityOptions {
-  double full_scale = 0.0;          ///< reading that becomes 1; 0 = the quantile below, found from the recording
+  double full_scale = 0.0;            ///< reading that becomes 1; 0 = the quantile below, found from the recording
   double full_scale_quantile = 0.98;  ///< share of readings at or below full scale
 };
 
 /// The polar grid of intensity scan context (paper, section III-B).
 struct DescriptorOptions {
-  int rings = 60;              ///< N_r, radial bins
-  int sectors = 20;            ///< N_s, azimuthal bins
-  double max_range_m = 50.0;   ///< L_max
-  int min_occupied_cells = 12; ///< fewer occupied cells describe no place
+  int rings = 60;               ///< N_r, radial bins
+  int sectors = 20;             ///< N_s, azimuthal bins
+  double max_range_m = 50.0;    ///< L_max
+  int min_occupied_cells = 12;  ///< fewer occupied cells describe no place
 };
 
 /// The two search stages (paper, section III-C) and who may be matched (docs/protocol in results).
 struct RetrievalOptions {
-  int top_k = 5;                ///< candidates returned, best first
-  int shortlist = 200;          ///< places of best geometry score that enter the intensity stage; 0 = all
+  int top_k = 5;                     ///< candidates returned, best first
+  int shortlist = 200;               ///< places of best geometry score that enter the intensity stage; 0 = all
   double min_geometry_score = 0.0;   ///< epsilon_g
   double min_intensity_score = 0.0;  ///< epsilon_i
-  int exclude_frames = 50;      ///< places fewer frames before the query are not searched
-  double exclude_s = 30.0;      ///< places less time before the query are not searched
+  int exclude_frames = 50;           ///< places fewer frames before the query are not searched
+  double exclude_s = 30.0;           ///< places less time before the query are not searched
 };
 
 /// Temporal consistency (paper, eq. 10).
@@ -50,13 +50,13 @@ struct TemporalOptions {
 
 /// Geometric consistency: FPFH, then ICP (paper, section III-D).
 struct GeometricOptions {
-  double voxel_m = 1.0;            ///< edge of the voxels that thin a scan
-  int candidates = 3;              ///< how many of the top-K are registered, best first
+  double voxel_m = 1.0;               ///< edge of the voxels that thin a scan
+  int candidates = 3;                 ///< how many of the top-K are registered, best first
   double min_descriptor_score = 1.0;  ///< candidates with a lower Phi_g + Phi_i are not registered
-  double feature_radius_m = 3.0;   ///< neighbourhood of FPFH features
-  double inlier_distance_m = 0.4;  ///< farthest point-to-plane distance of an inlier
-  double min_inlier_ratio = 0.6;   ///< share of the points above ground, both ways, that must be inliers
-  double max_translation_m = 15.0; ///< a longer relative translation is refused
+  double feature_radius_m = 3.0;      ///< neighbourhood of FPFH features
+  double inlier_distance_m = 0.4;     ///< farthest point-to-plane distance of an inlier
+  double min_inlier_ratio = 0.6;      ///< share of the points above ground, both ways, that must be inliers
+  double max_translation_m = 15.0;    ///< a longer relative translation is refused
 };
 
 /// Every parameter of the system, at the shipped defaults.

@@ -15,7 +15,7 @@ struct CandidateRow {
   std::optional<FrameId> match;  ///< absent where nothing was found
   double score = 0.0;            ///< orders answers by confidence, larger is surer
   bool accepted = false;
-  std::string reason;            ///< why not accepted; empty where accepted
+  std::string reason;  ///< why not accepted; empty where accepted
 };
 
 /// One row of loops.csv: an accepted loop.

@@ -17,7 +17,8 @@ namespace revisit {
 struct IntensityScanContext {
   int rings = 0;    ///< N_r
   int sectors = 0;  ///< N_s
-  std::vector<std::uint8_t> intensity;   ///< [sector * rings + ring]: largest intensity of the cell, 255 = 1.0; 0 if empty
+  std::vector<std::uint8_t>
+      intensity;  ///< [sector * rings + ring]: largest intensity of the cell, 255 = 1.0; 0 if empty
   std::vector<std::uint64_t> occupancy;  ///< bit sector * rings + ring: the cell holds a point, whatever its intensity
 
   std::size_t cells() const { return intensity.size(); }
@@ -44,7 +45,8 @@ class Describer {
 
  private:
   DescriptorOptions options_;
-  std::vector<std::uint16_t> cells_;  ///< 0 = empty, 1 + quantised intensity otherwise; one more for points beyond the range
+  std::vector<std::uint16_t>
+      cells_;  ///< 0 = empty, 1 + quantised intensity otherwise; one more for points beyond the range
 };
 
 }  // namespace revisit

@@ -25,8 +25,8 @@ TEST(Describe, ACellIsWhatItsPointsMakeIt) {
   options.sectors = 4;
   options.max_range_m = 50.0;
   // Sector 2 is theta in [0, pi/2), ring 1 is rho in [5, 10).
-  const std::vector<Point> points = {{6.f, 1.f, 0.f, 0.2f}, {7.f, 2.f, 5.f, 0.6f}, {-30.f, -1.f, 0.f, 0.f},
-                                     {60.f, 0.f, 0.f, 1.f}};
+  const std::vector<Point> points = {
+      {6.f, 1.f, 0.f, 0.2f}, {7.f, 2.f, 5.f, 0.6f}, {-30.f, -1.f, 0.f, 0.f}, {60.f, 0.f, 0.f, 1.f}};
   const IntensityScanContext context = describe(points, options);
   EXPECT_EQ(context.occupied_cells(), 2) << "the point beyond 50 m is left out";
   EXPECT_TRUE(context.occupied(1, 2));
@@ -67,7 +67,8 @@ TEST(Describe, RotationByASectorIsAShiftByAColumn) {
       for (int j = 0; j < sectors; ++j)
         for (int i = 0; i < rings; ++i) {
           const int to = (j + k) % sectors;
-          ASSERT_EQ(a.intensity[static_cast<std::size_t>(j * rings + i)], b.intensity[static_cast<std::size_t>(to * rings + i)]);
+          ASSERT_EQ(a.intensity[static_cast<std::size_t>(j * rings + i)],
+                    b.intensity[static_cast<std::size_t>(to * rings + i)]);
           ASSERT_EQ(a.occupied(i, j), b.occupied(i, to));
         }
     }

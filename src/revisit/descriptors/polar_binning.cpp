@@ -26,8 +26,8 @@ HWY_INLINE VF Atan2(F f, VF y, VF x) {
   const VF a = hn::Div(hn::Min(ax, ay), hn::Add(hn::Max(ax, ay), hn::Set(f, 1e-30f)));
   const VF s = hn::Mul(a, a);
   VF p = hn::Set(f, -0.00405421526f);
-  for (const float c : {0.0218616318f, -0.0559103291f, 0.0964204435f, -0.139085672f, 0.199465528f, -0.333298597f,
-                        0.999999335f})
+  for (const float c :
+       {0.0218616318f, -0.0559103291f, 0.0964204435f, -0.139085672f, 0.199465528f, -0.333298597f, 0.999999335f})
     p = hn::MulAdd(p, s, hn::Set(f, c));
   VF r = hn::Mul(p, a);
   r = hn::IfThenElse(hn::Gt(ay, ax), hn::Sub(hn::Set(f, kPi / 2), r), r);

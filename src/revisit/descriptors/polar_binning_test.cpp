@@ -25,8 +25,15 @@ std::vector<Point> hard_points(const PolarGrid& grid, std::size_t count, unsigne
                       static_cast<float>(reading(random))});
   }
   const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
-  for (const Point& odd : {Point{0, 0, 0, 0.5f}, {nan, 1, 0, 0.5f}, {1, inf, 0, 0.5f}, {3, 1, 0, nan}, {-5, 0.f, 0, 0.5f},
-                           {-5, -0.f, 0, 0.7f}, {1e30f, 1e30f, 0, 1}, {5, 0, 0, 0.f}, {0, -5, 0, 2.f}})
+  for (const Point& odd : {Point{0, 0, 0, 0.5f},
+                           {nan, 1, 0, 0.5f},
+                           {1, inf, 0, 0.5f},
+                           {3, 1, 0, nan},
+                           {-5, 0.f, 0, 0.5f},
+                           {-5, -0.f, 0, 0.7f},
+                           {1e30f, 1e30f, 0, 1},
+                           {5, 0, 0, 0.f},
+                           {0, -5, 0, 2.f}})
     points.push_back(odd);
   return points;
 }
@@ -42,7 +49,8 @@ TEST_F(EveryTarget, EqualsTheScalarReferenceBitForBit) {
   for (const std::int64_t target : targets) {
     force_target(target);
     names.insert(current_target_name());
-    for (const PolarGrid& grid : {PolarGrid{60, 20, 50.0}, {20, 60, 50.0}, {1, 1, 10.0}, {512, 720, 80.0}, {7, 13, 33.3}}) {
+    for (const PolarGrid& grid :
+         {PolarGrid{60, 20, 50.0}, {20, 60, 50.0}, {1, 1, 10.0}, {512, 720, 80.0}, {7, 13, 33.3}}) {
       for (const std::size_t count : {0u, 1u, 15u, 20000u}) {
         const auto points = hard_points(grid, count, 9);
         std::vector<std::uint16_t> fast(static_cast<std::size_t>(grid.rings * grid.sectors) + 1, 0), slow = fast;

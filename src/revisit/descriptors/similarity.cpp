@@ -13,9 +13,9 @@ GeometryMatch match_geometry(const IntensityScanContext& query, const IntensityS
   if (query.rings != candidate.rings || query.sectors != candidate.sectors || query.cells() == 0)
     throw std::invalid_argument("descriptors of different grids cannot be compared");
   std::uint32_t shift = 0;
-  const std::uint32_t distance =
-      revisit_bits_min_hamming(query.occupancy.data(), candidate.occupancy.data(),
-                               static_cast<std::uint32_t>(query.rings), static_cast<std::uint32_t>(query.sectors), &shift);
+  const std::uint32_t distance = revisit_bits_min_hamming(query.occupancy.data(), candidate.occupancy.data(),
+                                                          static_cast<std::uint32_t>(query.rings),
+                                                          static_cast<std::uint32_t>(query.sectors), &shift);
   return {1.0 - static_cast<double>(distance) / static_cast<double>(query.cells()), static_cast<int>(shift)};
 }
 

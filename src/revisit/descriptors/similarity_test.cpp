@@ -14,7 +14,8 @@ IntensityScanContext random_context(int rings, int sectors, double density, unsi
   std::mt19937 random(seed);
   std::bernoulli_distribution occupied(density);
   std::uniform_int_distribution<int> reading(0, 255);
-  IntensityScanContext context{rings, sectors, std::vector<std::uint8_t>(static_cast<std::size_t>(rings * sectors)), {}};
+  IntensityScanContext context{
+      rings, sectors, std::vector<std::uint8_t>(static_cast<std::size_t>(rings * sectors)), {}};
   context.occupancy.assign((context.cells() + 63) / 64, 0);
   for (std::size_t i = 0; i < context.cells(); ++i)
     if (occupied(random)) {

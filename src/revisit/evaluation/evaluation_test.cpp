@@ -42,8 +42,11 @@ CandidateRow answer(int query, int match, double score) { return {FrameId{query}
 TEST(RetrievalTable, CountsByHand) {
   const Reference reference = there_and_back();
   // 150 <-> 49, 151 <-> 48: right. 152 -> 10: wrong place. 110 is no revisit: false. 199 has no answer.
-  const std::vector<CandidateRow> rows = {answer(150, 49, 0.9), answer(152, 10, 0.8), answer(151, 48, 0.7),
-                                          answer(110, 3, 0.6), {FrameId{199}, std::nullopt, 0.0, false, ""}};
+  const std::vector<CandidateRow> rows = {answer(150, 49, 0.9),
+                                          answer(152, 10, 0.8),
+                                          answer(151, 48, 0.7),
+                                          answer(110, 3, 0.6),
+                                          {FrameId{199}, std::nullopt, 0.0, false, ""}};
   const RetrievalTable table = evaluate_retrieval(rows, reference);
   EXPECT_EQ(table.answers, 4u);
   EXPECT_EQ(table.right, 2u);
@@ -82,11 +85,11 @@ LoopRow loop(int query, int match, const Pose& T_match_query) {
 TEST(LoopTable, RightWithinHalfAMetreAndThreeDegrees) {
   const Reference reference = there_and_back();
   const std::vector<LoopRow> rows = {
-      loop(150, 49, at(0.4, 0, 180)),   // 0.4 m off
-      loop(151, 48, at(0.6, 0, 180)),   // too far
-      loop(152, 47, at(0, 0, 176)),     // too much turned
-      loop(153, 40, at(6, 0, 180)),     // a right pose to a frame 6 m away is no false loop
-      loop(900, 47, at(0, 0, 0)),       // no reference
+      loop(150, 49, at(0.4, 0, 180)),  // 0.4 m off
+      loop(151, 48, at(0.6, 0, 180)),  // too far
+      loop(152, 47, at(0, 0, 176)),    // too much turned
+      loop(153, 40, at(6, 0, 180)),    // a right pose to a frame 6 m away is no false loop
+      loop(900, 47, at(0, 0, 0)),      // no reference
   };
   const LoopTable table = evaluate_loops(rows, reference);
   EXPECT_EQ(table.accepted, 4u);
@@ -103,7 +106,12 @@ TEST(LoopTable, RightWithinHalfAMetreAndThreeDegrees) {
 // way" means a heading that differs by more than 150 degrees, from the nearest of those frames.
 TEST(Reference, RevisitsOfKittiAsPublished) {
   REVISIT_NEEDS_SHARED_DATA();
-  for (const auto& [name, revisits, reverse] : {std::tuple{"00", 791u, 2u}, {"02", 287u, 43u}, {"05", 493u, 0u}, {"06", 269u, 0u}, {"07", 96u, 0u}, {"08", 265u, 223u}}) {
+  for (const auto& [name, revisits, reverse] : {std::tuple{"00", 791u, 2u},
+                                                {"02", 287u, 43u},
+                                                {"05", 493u, 0u},
+                                                {"06", 269u, 0u},
+                                                {"07", 96u, 0u},
+                                                {"08", 265u, 223u}}) {
     std::ifstream file(shared_data() / "poses" / (std::string("kitti_") + name + ".txt"));
     Trajectory trajectory;
     std::string line;

@@ -19,8 +19,8 @@ struct JudgedLoop {
 struct LoopTable {
   std::size_t revisits = 0, reverse_revisits = 0;
   std::size_t accepted = 0, false_loops = 0;
-  std::size_t without_reference = 0;  ///< accepted loops that cannot be judged; in no other figure
-  double precision = 1.0;             ///< 1 where nothing was accepted
+  std::size_t without_reference = 0;          ///< accepted loops that cannot be judged; in no other figure
+  double precision = 1.0;                     ///< 1 where nothing was accepted
   double recall = 0.0, reverse_recall = 0.0;  ///< revisits with a right accepted loop
   double median_translation_m = 0.0, p95_translation_m = 0.0;
   double median_rotation_deg = 0.0, p95_rotation_deg = 0.0;

@@ -13,15 +13,15 @@ namespace revisit {
 struct EvaluationRules {
   int exclude_frames = 50;
   double exclude_s = 30.0;
-  double same_place_m = 4.0;           ///< 3-D distance of two poses
-  double reverse_heading_deg = 90.0;   ///< a revisit whose heading differs by more is a reverse one
-  double right_translation_m = 0.5;    ///< of a loop's pose from the reference
+  double same_place_m = 4.0;          ///< 3-D distance of two poses
+  double reverse_heading_deg = 90.0;  ///< a revisit whose heading differs by more is a reverse one
+  double right_translation_m = 0.5;   ///< of a loop's pose from the reference
   double right_rotation_deg = 3.0;
 };
 
 /// A query that has an allowed frame within the same place.
 struct Revisit {
-  FrameId nearest;       ///< the allowed frame that is nearest
+  FrameId nearest;  ///< the allowed frame that is nearest
   double distance_m = 0.0;
   bool reverse = false;  ///< it heads more than reverse_heading_deg another way
 };

@@ -38,7 +38,8 @@ RetrievalTable evaluate_retrieval(const std::vector<CandidateRow>& rows, const R
     const double precision = static_cast<double>(table.right) / static_cast<double>(i);
     const double recall = table.revisits == 0 ? 0.0 : static_cast<double>(table.right) / revisits;
     table.curve.push_back({score, precision, recall});
-    if (precision + recall > 0.0) table.f1_max = std::max(table.f1_max, 2.0 * precision * recall / (precision + recall));
+    if (precision + recall > 0.0)
+      table.f1_max = std::max(table.f1_max, 2.0 * precision * recall / (precision + recall));
     table.average_precision += (recall - last_recall) * precision;
     last_recall = recall;
     pure = pure && table.right == i;

@@ -16,11 +16,11 @@ struct PrecisionRecall {
 /// Table 1: top-1 retrieval as `score` is swept.
 struct RetrievalTable {
   std::size_t revisits = 0, answers = 0, right = 0;
-  double recall_at_1 = 0.0;      ///< top-1 right, no threshold
+  double recall_at_1 = 0.0;  ///< top-1 right, no threshold
   double f1_max = 0.0;
-  double average_precision = 0.0;  ///< area under the curve by steps
-  double recall_at_p100 = 0.0;   ///< largest recall before the first false answer
-  double extended_precision = 0.0;  ///< (precision at the smallest recall + recall_at_p100) / 2
+  double average_precision = 0.0;      ///< area under the curve by steps
+  double recall_at_p100 = 0.0;         ///< largest recall before the first false answer
+  double extended_precision = 0.0;     ///< (precision at the smallest recall + recall_at_p100) / 2
   std::vector<PrecisionRecall> curve;  ///< by falling score; equal scores are one point
 };
 

@@ -63,9 +63,9 @@ bool is_kitti(const std::string& bytes) {
 }
 
 bool is_nclt(const std::string& bytes) {
-  return bytes.size() % kNcltBytes == 0 &&
-         share_of_records(bytes, kNcltBytes, [](const char* record) { return load<std::uint8_t>(record + 7) < 32; }) ==
-             1.0;
+  return bytes.size() % kNcltBytes == 0 && share_of_records(bytes, kNcltBytes, [](const char* record) {
+                                             return load<std::uint8_t>(record + 7) < 32;
+                                           }) == 1.0;
 }
 
 Scan read_floats(const std::string& bytes, std::size_t record_bytes) {

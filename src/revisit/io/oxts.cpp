@@ -15,9 +15,10 @@ Pose mercator_pose(const double* row, double scale) {
   Pose T = Pose::Identity();
   T.translation() << scale * to_radians(longitude_deg) * kEarthRadius_m,
       scale * kEarthRadius_m * std::log(std::tan(to_radians(90.0 + latitude_deg) / 2.0)), altitude_m;
-  T.linear() = (Eigen::AngleAxisd(row[5], Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(row[4], Eigen::Vector3d::UnitY()) *
-                Eigen::AngleAxisd(row[3], Eigen::Vector3d::UnitX()))
-                   .toRotationMatrix();
+  T.linear() =
+      (Eigen::AngleAxisd(row[5], Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(row[4], Eigen::Vector3d::UnitY()) *
+       Eigen::AngleAxisd(row[3], Eigen::Vector3d::UnitX()))
+          .toRotationMatrix();
   return T;
 }
 
@@ -26,7 +27,8 @@ Pose mercator_pose(const double* row, double scale) {
 Result<std::map<FrameId, Pose>> read_oxts(const std::filesystem::path& folder) {
   std::map<FrameId, std::vector<double>> rows;
   std::error_code failure;
-  for (std::filesystem::directory_iterator it(folder / "data", failure), end; !failure && it != end; it.increment(failure)) {
+  for (std::filesystem::directory_iterator it(folder / "data", failure), end; !failure && it != end;
+       it.increment(failure)) {
     const std::string stem = it->path().stem().string();
     std::int64_t number = 0;
     const auto parsed = std::from_chars(stem.data(), stem.data() + stem.size(), number);

@@ -48,8 +48,8 @@ void repair_padding(PcdHeader& header) {
 }
 
 Status check_data(const std::filesystem::path& file, const PcdHeader& header, std::string_view data) {
-  const std::string declared = std::to_string(header.points) + " points of " + std::to_string(header.point_bytes()) +
-                               " bytes declared";
+  const std::string declared =
+      std::to_string(header.points) + " points of " + std::to_string(header.point_bytes()) + " bytes declared";
   if (header.encoding == "binary") {
     if (data.size() / header.point_bytes() < header.points)
       return Error{file.string() + ": truncated: " + declared + ", data end after " +

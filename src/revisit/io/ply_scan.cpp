@@ -11,8 +11,9 @@ namespace revisit::io_internal {
 namespace {
 
 const std::map<std::string_view, std::size_t> kTypeBytes = {
-    {"char", 1}, {"int8", 1},  {"uchar", 1},  {"uint8", 1},  {"short", 2}, {"int16", 2},   {"ushort", 2}, {"uint16", 2},
-    {"int", 4},  {"int32", 4}, {"uint", 4},   {"uint32", 4}, {"float", 4}, {"float32", 4}, {"double", 8}, {"float64", 8}};
+    {"char", 1},   {"int8", 1},    {"uchar", 1},  {"uint8", 1},  {"short", 2}, {"int16", 2},
+    {"ushort", 2}, {"uint16", 2},  {"int", 4},    {"int32", 4},  {"uint", 4},  {"uint32", 4},
+    {"float", 4},  {"float32", 4}, {"double", 8}, {"float64", 8}};
 
 // PCL reserves what the header declares: make sure that the file can hold it.
 Status check_header(const std::filesystem::path& file, std::string_view bytes) {

@@ -36,15 +36,24 @@ double load(const std::uint8_t* at) {
 double value_of(const PCLPointField& field, const std::uint8_t* record) {
   const std::uint8_t* at = record + field.offset;
   switch (field.datatype) {
-    case PCLPointField::INT8: return load<std::int8_t>(at);
-    case PCLPointField::UINT8: return load<std::uint8_t>(at);
-    case PCLPointField::INT16: return load<std::int16_t>(at);
-    case PCLPointField::UINT16: return load<std::uint16_t>(at);
-    case PCLPointField::INT32: return load<std::int32_t>(at);
-    case PCLPointField::UINT32: return load<std::uint32_t>(at);
-    case PCLPointField::FLOAT32: return load<float>(at);
-    case PCLPointField::FLOAT64: return load<double>(at);
-    default: return std::numeric_limits<double>::quiet_NaN();
+    case PCLPointField::INT8:
+      return load<std::int8_t>(at);
+    case PCLPointField::UINT8:
+      return load<std::uint8_t>(at);
+    case PCLPointField::INT16:
+      return load<std::int16_t>(at);
+    case PCLPointField::UINT16:
+      return load<std::uint16_t>(at);
+    case PCLPointField::INT32:
+      return load<std::int32_t>(at);
+    case PCLPointField::UINT32:
+      return load<std::uint32_t>(at);
+    case PCLPointField::FLOAT32:
+      return load<float>(at);
+    case PCLPointField::FLOAT64:
+      return load<double>(at);
+    default:
+      return std::numeric_limits<double>::quiet_NaN();
   }
 }
 
@@ -73,7 +82,8 @@ Result<Scan> to_scan(const std::filesystem::path& file, const pcl::PCLPointCloud
   const PCLPointField* intensity = find_field(
       cloud, {"intensity", "scalar_intensity", "reflectivity", "reflectance", "remission", "intensities", "i"});
   const PCLPointField* ring = find_field(cloud, {"ring", "laser", "line", "channel", "laser_id", "scalar_ring"});
-  const PCLPointField* time = find_field(cloud, {"t", "time", "timestamp", "time_offset", "offset_time", "scalar_time"});
+  const PCLPointField* time =
+      find_field(cloud, {"t", "time", "timestamp", "time_offset", "offset_time", "scalar_time"});
   if (intensity == nullptr) log_to(log, LogLevel::kWarning, file.string() + ": no intensity field; 0 is used");
 
   const std::size_t points = std::size_t{cloud.width} * cloud.height;

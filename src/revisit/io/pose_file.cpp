@@ -63,8 +63,8 @@ Result<PoseFile> from_rows(const std::filesystem::path& file, const std::vector<
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto& v = rows[i].values;
     if (v.size() != width)
-      return bad_row(file, rows[i].line, std::to_string(v.size()) + " numbers; allowed: " + std::to_string(width) +
-                                             " as in the first row");
+      return bad_row(file, rows[i].line,
+                     std::to_string(v.size()) + " numbers; allowed: " + std::to_string(width) + " as in the first row");
     PoseRow row;
     std::optional<Pose> pose;
     if (width == 8) {
@@ -78,7 +78,8 @@ Result<PoseFile> from_rows(const std::filesystem::path& file, const std::vector<
       row.frame = FrameId{static_cast<std::int64_t>(frame)};
       pose = from_matrix_row(v.data() + (width - 12));
     }
-    if (!pose) return bad_row(file, rows[i].line, width == 8 ? quaternion_fault(v.data() + 1) : "not a rigid transform");
+    if (!pose)
+      return bad_row(file, rows[i].line, width == 8 ? quaternion_fault(v.data() + 1) : "not a rigid transform");
     row.T_world_body = *pose;
     poses.rows.push_back(row);
   }
@@ -148,7 +149,8 @@ Status write_kitti_poses(const std::filesystem::path& file, const Trajectory& tr
 Status write_tum_poses(const std::filesystem::path& file, const Trajectory& trajectory) {
   TextWriter writer(file);
   for (const auto& [frame, entry] : trajectory.entries) {
-    writer.stream() << std::fixed << std::setprecision(6) << entry.stamp_s << std::defaultfloat << std::setprecision(10);
+    writer.stream() << std::fixed << std::setprecision(6) << entry.stamp_s << std::defaultfloat
+                    << std::setprecision(10);
     write_quaternion(writer, entry.T_world_lidar);
     writer.stream() << '\n';
   }

@@ -90,9 +90,9 @@ TEST(PoseFile, RowsThatAreNoPosesAreNamedByLine) {
 
 TEST(PoseFile, RealTrajectories) {
   REVISIT_NEEDS_SHARED_DATA();
-  for (const auto& [name, format, count] :
-       {std::tuple{"kitti_00.txt", PoseFormat::kKitti, 4541u}, {"kitti_08.txt", PoseFormat::kKitti, 4071u},
-        {"mulran_kaist03.txt", PoseFormat::kKitti, 3179u}}) {
+  for (const auto& [name, format, count] : {std::tuple{"kitti_00.txt", PoseFormat::kKitti, 4541u},
+                                            {"kitti_08.txt", PoseFormat::kKitti, 4071u},
+                                            {"mulran_kaist03.txt", PoseFormat::kKitti, 3179u}}) {
     const auto poses = read_poses(shared_data() / "poses" / name);
     ASSERT_TRUE(poses) << poses.error().message;
     EXPECT_EQ(poses->format, format);

@@ -15,7 +15,8 @@ using testing_support::shared_data;
 void write_bin(const fs::path& file, float x) {
   std::ofstream stream(file, std::ios::binary);
   for (int i = 0; i < 10; ++i)
-    for (const float value : {x, static_cast<float>(i), 0.f, 0.5f}) stream.write(reinterpret_cast<const char*>(&value), 4);
+    for (const float value : {x, static_cast<float>(i), 0.f, 0.5f})
+      stream.write(reinterpret_cast<const char*>(&value), 4);
 }
 
 TEST(Recording, BareFolderTakesFrameNumbersFromNames) {

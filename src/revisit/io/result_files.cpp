@@ -46,7 +46,8 @@ Status read_csv(const fs::path& file, std::string_view header, ReadRow read_row)
   const auto text = io_internal::read_bytes(file);
   if (!text) return text.error();
   const auto lines = io_internal::split_lines(*text);
-  if (lines.empty() || lines[0] != header) return Error{file.string() + ": the first line must be '" + std::string(header) + "'"};
+  if (lines.empty() || lines[0] != header)
+    return Error{file.string() + ": the first line must be '" + std::string(header) + "'"};
   for (std::size_t i = 1; i < lines.size(); ++i) {
     if (lines[i].empty()) continue;
     if (!read_row(split_cells(lines[i])))
@@ -85,7 +86,8 @@ Result<ResultWriter> ResultWriter::create(const fs::path& folder, bool overwrite
 Status ResultWriter::add(const CandidateRow& row) {
   auto& out = files_->candidates.stream();
   std::string reason = row.reason;
-  std::replace_if(reason.begin(), reason.end(), [](char c) { return c == ',' || c == '\n' || c == '"'; }, ';');
+  std::replace_if(
+      reason.begin(), reason.end(), [](char c) { return c == ',' || c == '\n' || c == '"'; }, ';');
   out << row.query.value << ',';
   if (row.match) out << row.match->value;
   out << ',' << std::setprecision(6) << row.score << ',' << (row.accepted ? 1 : 0) << ',' << reason << '\n';
@@ -98,7 +100,8 @@ Status ResultWriter::add(const LoopRow& row) {
   const Eigen::Vector3d t = loop.T_match_query.translation();
   const Eigen::Quaterniond q = Eigen::Quaterniond(loop.T_match_query.rotation()).normalized();
   out << loop.query.value << ',' << loop.match.value;
-  for (const double value : {row.score, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w(), loop.inlier_ratio, loop.rmse_m})
+  for (const double value :
+       {row.score, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w(), loop.inlier_ratio, loop.rmse_m})
     out << ',' << value;
   out << '\n';
   return files_->loops.flush();

@@ -82,9 +82,11 @@ TEST(CalibrationFile, ReadsBackAndRefusesNonsense) {
   ASSERT_TRUE(again) << again.error().message;
   EXPECT_EQ(again->distance_gains, calibration.distance_gains);
   EXPECT_EQ(again->ring_gains, calibration.ring_gains);
-  for (const char* text : {"", "[]", "{}", R"({"format":"revisit intensity calibration","version":2})",
-                           R"({"format":"revisit intensity calibration","version":1,"distance_knots_m":[2,1],"distance_gains":[1,1],"ring_gains":[]})",
-                           R"({"format":"revisit intensity calibration","version":1,"distance_knots_m":[1],"distance_gains":[-1],"ring_gains":[]})"}) {
+  for (
+      const char* text :
+      {"", "[]", "{}", R"({"format":"revisit intensity calibration","version":2})",
+       R"({"format":"revisit intensity calibration","version":1,"distance_knots_m":[2,1],"distance_gains":[1,1],"ring_gains":[]})",
+       R"({"format":"revisit intensity calibration","version":1,"distance_knots_m":[1],"distance_gains":[-1],"ring_gains":[]})"}) {
     std::ofstream(file, std::ios::trunc) << text;
     EXPECT_FALSE(read_calibration(file)) << text;
   }

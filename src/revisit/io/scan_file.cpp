@@ -59,8 +59,8 @@ Result<Scan> read_scan(const std::filesystem::path& file, const LogSink& log) {
   try {
     Result<Scan> scan = read_any(file, log);
     if (scan && scan->points.empty())
-      return Error{file.string() + ": no usable point: " + std::to_string(scan->dropped_non_finite) +
-                   " not finite, " + std::to_string(scan->dropped_at_origin) + " at (0,0,0)"};
+      return Error{file.string() + ": no usable point: " + std::to_string(scan->dropped_non_finite) + " not finite, " +
+                   std::to_string(scan->dropped_at_origin) + " at (0,0,0)"};
     return scan;
   } catch (const std::exception& problem) {  // what the readers underneath throw on broken files
     return Error{file.string() + ": cannot be read: " + problem.what()};

@@ -73,10 +73,11 @@ TEST(ReadBin, FiveFloatsWithRings) {
 }
 
 TEST(ReadBin, BrokenFilesAreRefusedWithTheirName) {
-  for (const auto& [name, bytes] : {std::pair<std::string, std::string>{"truncated.bin", kitti_bytes(100).substr(0, 1595)},
-                                    {"truncated8.bin", kitti_bytes(101).substr(0, 1608)},
-                                    {"empty.bin", ""},
-                                    {"text.bin", "this is no scan at all, but a letter"}}) {
+  for (const auto& [name, bytes] :
+       {std::pair<std::string, std::string>{"truncated.bin", kitti_bytes(100).substr(0, 1595)},
+        {"truncated8.bin", kitti_bytes(101).substr(0, 1608)},
+        {"empty.bin", ""},
+        {"text.bin", "this is no scan at all, but a letter"}}) {
     const auto scan = read_scan(write_file(name, bytes));
     ASSERT_FALSE(scan) << name;
     EXPECT_NE(scan.error().message.find(name), std::string::npos) << scan.error().message;
@@ -98,16 +99,17 @@ TEST(ReadScan, KindsThatAreNotReadSayWhatToDo) {
   EXPECT_NE(read_scan("/no/such.bin").error().message.find("No such file"), std::string::npos);
 }
 
-std::string pcd(const std::string& fields, const std::string& sizes, const std::string& types, const std::string& counts,
-                int points, const std::string& encoding) {
+std::string pcd(const std::string& fields, const std::string& sizes, const std::string& types,
+                const std::string& counts, int points, const std::string& encoding) {
   return "# .PCD v0.7\nVERSION 0.7\nFIELDS " + fields + "\nSIZE " + sizes + "\nTYPE " + types + "\nCOUNT " + counts +
          "\nWIDTH " + std::to_string(points) + "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + std::to_string(points) +
          "\nDATA " + encoding + "\n";
 }
 
 TEST(ReadPcd, AsciiWithRings) {
-  const auto scan = read_scan(write_file("a.pcd", pcd("x y z intensity ring", "4 4 4 4 2", "F F F F U", "1 1 1 1 1", 2, "ascii") +
-                                                      "1 2 3 40 5\n-1 nan 3 40 6\n"));
+  const auto scan =
+      read_scan(write_file("a.pcd", pcd("x y z intensity ring", "4 4 4 4 2", "F F F F U", "1 1 1 1 1", 2, "ascii") +
+                                        "1 2 3 40 5\n-1 nan 3 40 6\n"));
   ASSERT_TRUE(scan) << scan.error().message;
   ASSERT_EQ(scan->points.size(), 1u);
   EXPECT_EQ(scan->rings, (std::vector<std::uint16_t>{5}));
@@ -129,32 +131,33 @@ TEST(ReadPcd, TimesOfAnyUnitBecomeSecondsOfTheSweep) {
 
 TEST(ReadPcd, LyingHeadersAreRefused) {
   const std::string body(64, '\1');
-  for (const std::string& header : {
-           pcd("x y z", "4 4 4", "F F F", "1 1 1", 1000, "binary"),             // more points than data
-           pcd("x y z", "4 4 4", "F F F", "1 1 1", 1000, "binary_compressed"),
-           pcd("x y z", "4 4 4", "F F F", "1 1 1", 2, "zipped"),
-           pcd("x y z", "4 4", "F F F", "1 1 1", 2, "binary"),
-           pcd("x y z", "4 4 3", "F F F", "1 1 1", 2, "binary"),
-           pcd("x y z", "4 4 4", "F F F", "1 1 999999999", 2, "binary"),
-           pcd("x y", "4 4", "F F", "1 1", 2, "binary"),                         // no z
-           pcd("x y z", "4 4 4", "F F F", "1 1 1", 2, "ascii"),                 // no text
-           std::string("VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 99999999999999999999\n"
-                       "HEIGHT 1\nPOINTS 1\nDATA binary\n"),
-           std::string("FIELDS x y z\n"), std::string("DATA binary\n")}) {
+  for (const std::string& header :
+       {pcd("x y z", "4 4 4", "F F F", "1 1 1", 1000, "binary"),  // more points than data
+        pcd("x y z", "4 4 4", "F F F", "1 1 1", 1000, "binary_compressed"),
+        pcd("x y z", "4 4 4", "F F F", "1 1 1", 2, "zipped"), pcd("x y z", "4 4", "F F F", "1 1 1", 2, "binary"),
+        pcd("x y z", "4 4 3", "F F F", "1 1 1", 2, "binary"),
+        pcd("x y z", "4 4 4", "F F F", "1 1 999999999", 2, "binary"),
+        pcd("x y", "4 4", "F F", "1 1", 2, "binary"),         // no z
+        pcd("x y z", "4 4 4", "F F F", "1 1 1", 2, "ascii"),  // no text
+        std::string("VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 99999999999999999999\n"
+                    "HEIGHT 1\nPOINTS 1\nDATA binary\n"),
+        std::string("FIELDS x y z\n"), std::string("DATA binary\n")}) {
     const auto scan = read_scan(write_file("a.pcd", header + body));
     EXPECT_FALSE(scan) << header;
   }
 }
 
 TEST(ReadPly, AsciiAndLies) {
-  const std::string header = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
-                             "property float z\nproperty float intensity\nend_header\n";
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+      "property float z\nproperty float intensity\nend_header\n";
   const auto scan = read_scan(write_file("a.ply", header + "1 2 3 4\n5 6 7 8\n"));
   ASSERT_TRUE(scan) << scan.error().message;
   ASSERT_EQ(scan->points.size(), 2u);
   EXPECT_FLOAT_EQ(scan->points[1].z, 7.f);
-  EXPECT_FALSE(read_scan(write_file("b.ply", "ply\nformat binary_little_endian 1.0\nelement vertex 1000000\nproperty float x\n"
-                                             "property float y\nproperty float z\nend_header\nshort")));
+  EXPECT_FALSE(read_scan(write_file("b.ply",
+                                    "ply\nformat binary_little_endian 1.0\nelement vertex 1000000\nproperty float x\n"
+                                    "property float y\nproperty float z\nend_header\nshort")));
   EXPECT_FALSE(read_scan(write_file("c.ply", "no ply at all")));
 }
 
@@ -191,41 +194,44 @@ TEST_P(RealFormats, ReadRightOrRefusedWithAReason) {
   EXPECT_NEAR(max_intensity, expected.max_intensity, 1e-3f * expected.max_intensity);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Formats, RealFormats,
-    testing::Values(Expectation{"handheld_os0.pcd", 73452, 0, false, 811.f},
-                    Expectation{"hdl32_padded_a.pcd", 64545, 32, false, 118.f},
-                    Expectation{"hdl32_padded_b.pcd", 64032, 32, false, 115.f},
-                    Expectation{"hdl32_pair.ply", 64685, 0, false, 128.f},
-                    Expectation{"hdl32_pair_a.pcd", 64056, 0, false, 114.f},
-                    Expectation{"hdl32_pair_b.pcd", 64685, 0, false, 128.f},
-                    Expectation{"hesai_binary_compressed.pcd", 80787, 61, true, 254.f},
-                    Expectation{"livox.pcd", 41657, 0, false, 255.f},
-                    Expectation{"livox_malformed_ascii.pcd", std::nullopt, 0, false, 0.f},
-                    Expectation{"nclt_velodyne_sync.bin", 23546, 32, false, 255.f},
-                    Expectation{"nuscenes_five_floats.pcd.bin", 34688, 32, false, 255.f},
-                    Expectation{"ouster_intensity_7000.pcd", 62082, 0, false, 7156.f},
-                    Expectation{"padded_ring_timestamp_f8.pcd", 68242, 40, true, 255.f},
-                    Expectation{"pandaset_organized_nan_compressed.pcd", 77295, 0, false, 255.f},
-                    Expectation{"rellis_os1.bin", 77708, 0, false, 0.0115053f},
-                    Expectation{"rellis_vlp32.bin", 37334, 0, false, 235.f},
-                    Expectation{"ring_time_in_intensity.pcd", 37101, 0, false, 20.1003f},
-                    Expectation{"vlp16_nan_unorganised_ring_time.pcd", 25207, 0, false, 15.1887f},
-                    Expectation{"width_height_zero.pcd", std::nullopt, 0, false, 0.f},
-                    Expectation{"vlp16_50_frames.pcap", std::nullopt, 0, false, 0.f},
-                    Expectation{"hdl32.pcap", std::nullopt, 0, false, 0.f},
-                    Expectation{"ouster_packets_ros1.bag", std::nullopt, 0, false, 0.f}),
-    [](const auto& each) {
-      std::string name = each.param.file;
-      std::replace_if(name.begin(), name.end(), [](char c) { return !std::isalnum(static_cast<unsigned char>(c)); }, '_');
-      return name;
-    });
+INSTANTIATE_TEST_SUITE_P(Formats, RealFormats,
+                         testing::Values(Expectation{"handheld_os0.pcd", 73452, 0, false, 811.f},
+                                         Expectation{"hdl32_padded_a.pcd", 64545, 32, false, 118.f},
+                                         Expectation{"hdl32_padded_b.pcd", 64032, 32, false, 115.f},
+                                         Expectation{"hdl32_pair.ply", 64685, 0, false, 128.f},
+                                         Expectation{"hdl32_pair_a.pcd", 64056, 0, false, 114.f},
+                                         Expectation{"hdl32_pair_b.pcd", 64685, 0, false, 128.f},
+                                         Expectation{"hesai_binary_compressed.pcd", 80787, 61, true, 254.f},
+                                         Expectation{"livox.pcd", 41657, 0, false, 255.f},
+                                         Expectation{"livox_malformed_ascii.pcd", std::nullopt, 0, false, 0.f},
+                                         Expectation{"nclt_velodyne_sync.bin", 23546, 32, false, 255.f},
+                                         Expectation{"nuscenes_five_floats.pcd.bin", 34688, 32, false, 255.f},
+                                         Expectation{"ouster_intensity_7000.pcd", 62082, 0, false, 7156.f},
+                                         Expectation{"padded_ring_timestamp_f8.pcd", 68242, 40, true, 255.f},
+                                         Expectation{"pandaset_organized_nan_compressed.pcd", 77295, 0, false, 255.f},
+                                         Expectation{"rellis_os1.bin", 77708, 0, false, 0.0115053f},
+                                         Expectation{"rellis_vlp32.bin", 37334, 0, false, 235.f},
+                                         Expectation{"ring_time_in_intensity.pcd", 37101, 0, false, 20.1003f},
+                                         Expectation{"vlp16_nan_unorganised_ring_time.pcd", 25207, 0, false, 15.1887f},
+                                         Expectation{"width_height_zero.pcd", std::nullopt, 0, false, 0.f},
+                                         Expectation{"vlp16_50_frames.pcap", std::nullopt, 0, false, 0.f},
+                                         Expectation{"hdl32.pcap", std::nullopt, 0, false, 0.f},
+                                         Expectation{"ouster_packets_ros1.bag", std::nullopt, 0, false, 0.f}),
+                         [](const auto& each) {
+                           std::string name = each.param.file;
+                           std::replace_if(
+                               name.begin(), name.end(),
+                               [](char c) { return !std::isalnum(static_cast<unsigned char>(c)); }, '_');
+                           return name;
+                         });
 
 // Cut and altered copies of small synthetic files: every prefix must be refused or read, never crash.
 TEST(ReadScan, SurvivesEveryTruncation) {
   std::string binary = pcd("x y z intensity", "4 4 4 4", "F F F F", "1 1 1 1", 20, "binary") + kitti_bytes(20);
-  const std::string ply = "ply\nformat binary_little_endian 1.0\nelement vertex 20\nproperty float x\nproperty float y\n"
-                          "property float z\nproperty float intensity\nend_header\n" + kitti_bytes(20);
+  const std::string ply =
+      "ply\nformat binary_little_endian 1.0\nelement vertex 20\nproperty float x\nproperty float y\n"
+      "property float z\nproperty float intensity\nend_header\n" +
+      kitti_bytes(20);
   const fs::path folder = fresh_folder();
   for (const auto& [name, whole] : {std::pair<std::string, std::string>{"a.pcd", binary}, {"a.ply", ply}}) {
     for (std::size_t size = 0; size < whole.size(); size += 3) {

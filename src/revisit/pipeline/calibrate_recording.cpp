@@ -57,8 +57,10 @@ Result<CalibrationReport> calibrate_recording(const Recording& recording, const 
   if (!has_poses) log_to(log, LogLevel::kInfo, "the recording has no poses: neighbouring scans are registered");
   const std::size_t count = std::min(recording.size(), most_scans);
   Eigen::Vector3d run_offset = Eigen::Vector3d::Zero();
+  std::optional<std::size_t> ring_count;
   for (std::size_t i = 0; i < count; ++i) {
-    if (!progress(i, count)) return Error{"stopped after " + std::to_string(i) + " of " + std::to_string(count) + " scans"};
+    if (!progress(i, count))
+      return Error{"stopped after " + std::to_string(i) + " of " + std::to_string(count) + " scans"};
     auto scan = recording.read(i);
     if (!scan) {
       log_to(log, LogLevel::kWarning, scan.error().message + "; skipped");
@@ -79,6 +81,14 @@ Result<CalibrationReport> calibrate_recording(const Recording& recording, const 
       T_world_lidar->pretranslate(run_offset);
     }
     if (!T_world_lidar) continue;
+    // Ring numbers mean the same laser only where as many rings were seen.
+    if (!ring_count) ring_count = rings.count();
+    if (*ring_count != rings.count()) {
+      log_to(log, LogLevel::kInfo,
+             "frame " + std::to_string(scan->frame.value) + " shows " + std::to_string(rings.count()) +
+                 " rings instead of " + std::to_string(*ring_count) + ": left out");
+      continue;
+    }
     normalise_intensity(*scan, *scale);
     learner.add(*scan, rings.of_point, *T_world_lidar);
   }

@@ -69,8 +69,8 @@ Detection LoopDetector::detect(const PreparedScan& prepared, const std::optional
   Detection detection;
   detection.frame = prepared.scan.frame;
   detection.points = prepared.scan.points.size();
-  detection.ground_points = std::accumulate(prepared.ground.is_ground.begin(), prepared.ground.is_ground.end(),
-                                            std::size_t{0});
+  detection.ground_points =
+      std::accumulate(prepared.ground.is_ground.begin(), prepared.ground.is_ground.end(), std::size_t{0});
   detection.rings = prepared.ground.rings;
   detection.preparation_ms = prepared.ms;
 

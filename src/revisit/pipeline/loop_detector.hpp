@@ -19,13 +19,13 @@ namespace revisit {
 struct Detection {
   FrameId frame;
   bool had_searchable_past = false;
-  std::vector<LoopCandidate> candidates;      ///< what retrieval proposed, best first
-  std::optional<LoopCandidate> answer;        ///< the candidate that the rest of the evidence is about
-  std::optional<TemporalEvidence> temporal;   ///< of the answer; absent where no candidate was found
-  std::optional<GeometricEvidence> geometric; ///< of the answer; absent where it was refused before registration
-  std::optional<LoopConstraint> loop;         ///< set where the answer was accepted
-  double score = 0.0;   ///< confidence that orders answers: mean descriptor score, plus the inlier ratio if registered
-  std::string reason;   ///< why there is no loop; empty where there is one
+  std::vector<LoopCandidate> candidates;       ///< what retrieval proposed, best first
+  std::optional<LoopCandidate> answer;         ///< the candidate that the rest of the evidence is about
+  std::optional<TemporalEvidence> temporal;    ///< of the answer; absent where no candidate was found
+  std::optional<GeometricEvidence> geometric;  ///< of the answer; absent where it was refused before registration
+  std::optional<LoopConstraint> loop;          ///< set where the answer was accepted
+  double score = 0.0;  ///< confidence that orders answers: mean descriptor score, plus the inlier ratio if registered
+  std::string reason;  ///< why there is no loop; empty where there is one
   std::optional<Pose> T_match_query_by_odometry;  ///< for comparison, where both scans came with a pose
 
   std::size_t points = 0, ground_points = 0;

@@ -26,7 +26,8 @@ TEST(LoopDetector, FindsThePlaceAndThePoseOfAReverseVisit) {
   const SyntheticWorld world(51);
   LoopDetector detector{Parameters{}};
   for (int i = 0; i < 8; ++i) {
-    const auto detection = detector.process(scan_at(world, i, SyntheticWorld::at(-28.0 + 8.0 * i, 0, 0), static_cast<unsigned>(i)));
+    const auto detection =
+        detector.process(scan_at(world, i, SyntheticWorld::at(-28.0 + 8.0 * i, 0, 0), static_cast<unsigned>(i)));
     ASSERT_TRUE(detection) << detection.error().message;
     EXPECT_FALSE(detection->had_searchable_past);
     EXPECT_EQ(detection->reason, "no searchable past");
@@ -94,7 +95,8 @@ struct Outcome {
   std::map<std::int64_t, Detection> loops;
 };
 
-Outcome run(const std::filesystem::path& folder, const Parameters& parameters, const std::filesystem::path& database = {}) {
+Outcome run(const std::filesystem::path& folder, const Parameters& parameters,
+            const std::filesystem::path& database = {}) {
   const auto recording = open_recording(folder);
   const auto map = open_recording(database.empty() ? folder : database);
   LoopDetector detector(parameters, *estimate_intensity_scale(**map, parameters));
@@ -117,7 +119,8 @@ TEST(LoopDetectorOnRealScans, TheOneRevisitAndNoOther) {
   EXPECT_EQ(detection.candidates[0].match.value, 52) << "top-1";
   const auto recording = open_recording(shared_data() / "kitti00_mini");
   const Trajectory& truth = (*recording)->trajectory();
-  const Pose error = (truth.at(FrameId{52})->inverse() * *truth.at(FrameId{4501})).inverse() * detection.loop->T_match_query;
+  const Pose error =
+      (truth.at(FrameId{52})->inverse() * *truth.at(FrameId{4501})).inverse() * detection.loop->T_match_query;
   EXPECT_LT(error.translation().norm(), 0.3);
   EXPECT_LT(to_degrees(rotation_angle(error)), 1.0);
 }

@@ -50,10 +50,10 @@ Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const
                       rings_fit ? std::span<const std::uint16_t>(rings.of_point) : std::span<const std::uint16_t>());
   prepared.ms.intensity = watch.lap_ms();
 
-  prepared.descriptor = describe(parameters.preprocess.remove_ground
-                                     ? above_ground(prepared.scan, prepared.ground.is_ground)
-                                     : prepared.scan.points,
-                                 parameters.descriptor);
+  prepared.descriptor =
+      describe(parameters.preprocess.remove_ground ? above_ground(prepared.scan, prepared.ground.is_ground)
+                                                   : prepared.scan.points,
+               parameters.descriptor);
   prepared.ms.describe = watch.lap_ms();
   if (prepared.descriptor.occupied_cells() < parameters.descriptor.min_occupied_cells)
     return Error{"frame " + std::to_string(prepared.scan.frame.value) + ": " +

@@ -31,7 +31,8 @@ TEST(PrepareScan, ScansThatDescribeNoPlaceSayWhy) {
   for (const Scan& scan : {one_cell, one_point, empty}) {
     const auto prepared = prepare_scan(scan, {}, {});
     ASSERT_FALSE(prepared);
-    EXPECT_NE(prepared.error().message.find("are needed to describe a place"), std::string::npos) << prepared.error().message;
+    EXPECT_NE(prepared.error().message.find("are needed to describe a place"), std::string::npos)
+        << prepared.error().message;
   }
 }
 

@@ -87,8 +87,9 @@ void CalibrationLearner::add(const Scan& scan, const std::vector<std::uint16_t>&
   });
   for (std::size_t begin = 0, end = 0; begin < samples.size(); begin = end) {
     float intensity = 0.f, distance_m = 0.f;
-    for (end = begin; end < samples.size() && samples[end].patch == samples[begin].patch &&
-                      samples[end].ring == samples[begin].ring; ++end) {
+    for (end = begin;
+         end < samples.size() && samples[end].patch == samples[begin].patch && samples[end].ring == samples[begin].ring;
+         ++end) {
       intensity += samples[end].intensity;
       distance_m += samples[end].distance_m;
     }
@@ -111,9 +112,8 @@ Result<CalibrationReport> CalibrationLearner::solve() const {
     for (end = begin; end < sorted.size() && sorted[end].patch == sorted[begin].patch;) ++end;
     const std::span<const Observation> group(sorted.data() + begin, std::min(end - begin, kMostObservationsOfPatch));
     constexpr float kLeastChange_m = 1.f;
-    const auto [near, far] = std::minmax_element(group.begin(), group.end(), [](const auto& x, const auto& y) {
-      return x.distance_m < y.distance_m;
-    });
+    const auto [near, far] = std::minmax_element(
+        group.begin(), group.end(), [](const auto& x, const auto& y) { return x.distance_m < y.distance_m; });
     if (group.size() < 2 || far->distance_m - near->distance_m < kLeastChange_m) continue;
     ++report.patches;
     report.observations += group.size();
@@ -160,8 +160,8 @@ Result<CalibrationReport> CalibrationLearner::solve() const {
   report.disagreement_before =
       disagreement(held_out, [](const Observation& each) { return std::exp(static_cast<double>(each.log_intensity)); });
   report.disagreement_after = disagreement(held_out, [&](const Observation& each) {
-    return std::exp(static_cast<double>(each.log_intensity)) *
-           report.calibration.distance_gain(each.distance_m) * report.calibration.ring_gain(each.ring);
+    return std::exp(static_cast<double>(each.log_intensity)) * report.calibration.distance_gain(each.distance_m) *
+           report.calibration.ring_gain(each.ring);
   });
   return report;
 }

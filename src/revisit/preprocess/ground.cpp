@@ -15,7 +15,8 @@ using preprocess_internal::RangeImage;
 
 // LeGO-LOAM's vertical test: the line between two returns of neighbouring rings rises at most by the slope. Only rings
 // that look down can meet the ground first.
-std::vector<std::uint8_t> label_pixels(const Scan& scan, const Rings& rings, const RangeImage& image, double slope_deg) {
+std::vector<std::uint8_t> label_pixels(const Scan& scan, const Rings& rings, const RangeImage& image,
+                                       double slope_deg) {
   const float tan2 = static_cast<float>(std::pow(std::tan(to_radians(slope_deg)), 2));
   std::vector<std::uint8_t> labels(image.point_at.size(), 0);
   const auto is_level = [&](std::int32_t a, std::int32_t b) {

@@ -13,8 +13,8 @@ namespace revisit {
 
 /// Which points lie on the ground, and how that was found.
 struct GroundSegmentation {
-  std::vector<std::uint8_t> is_ground;  ///< one a point, 0 or 1
-  RingSource rings = RingSource::kNone; ///< kNone: the polar-grid fallback, for sensors without rings
+  std::vector<std::uint8_t> is_ground;   ///< one a point, 0 or 1
+  RingSource rings = RingSource::kNone;  ///< kNone: the polar-grid fallback, for sensors without rings
   std::size_t ring_count = 0;
 };
 

@@ -68,7 +68,13 @@ TEST(Ground, SmallFlatPatchesAreNotGround) {
     for (int i = 0; i < 5; ++i) {
       scan.points.push_back({6.f + 0.25f * static_cast<float>(ring), 0.2f * static_cast<float>(i), -0.53f, 0.5f});
     }
-  Rings rings = find_rings(Scan{scan.frame, 0.0, {scan.points.begin(), scan.points.begin() + static_cast<std::ptrdiff_t>(floor_points)}, {}, {}, 0, 0});
+  Rings rings = find_rings(Scan{scan.frame,
+                                0.0,
+                                {scan.points.begin(), scan.points.begin() + static_cast<std::ptrdiff_t>(floor_points)},
+                                {},
+                                {},
+                                0,
+                                0});
   for (int ring = 0; ring < 4; ++ring)
     for (int i = 0; i < 5; ++i) rings.of_point.push_back(static_cast<std::uint16_t>(40 + ring));
   const auto result = segment_ground(scan, rings, {});

@@ -56,13 +56,13 @@ IntensityScale estimate_intensity_scale(std::span<const Scan> sample, const Inte
     scale.warning = "the intensity field holds no positive value: places are told apart by geometry alone";
   } else if (readings >= kFewestReadings && scale.min_raw == scale.max_raw) {
     scale.is_reflectance = false;
-    scale.warning = "all intensities are equal (" + std::to_string(scale.min_raw) +
-                    "): places are told apart by geometry alone";
+    scale.warning =
+        "all intensities are equal (" + std::to_string(scale.min_raw) + "): places are told apart by geometry alone";
   } else if (distinct > kShareOfDistinctReadings) {
     scale.is_reflectance = false;
-    scale.warning = "the intensity field is no reflectance: " +
-                    std::to_string(static_cast<int>(std::lround(100.0 * distinct))) +
-                    " % of its readings are different, as where an odometry front end stores ring + time in it";
+    scale.warning =
+        "the intensity field is no reflectance: " + std::to_string(static_cast<int>(std::lround(100.0 * distinct))) +
+        " % of its readings are different, as where an odometry front end stores ring + time in it";
   }
   return scale;
 }

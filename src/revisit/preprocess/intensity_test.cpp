@@ -88,8 +88,10 @@ TEST(NormaliseIntensity, AppliesTheCalibration) {
 
 TEST(IntensityScale, RealSensors) {
   REVISIT_NEEDS_SHARED_DATA();
-  for (const auto& [file, least, most] : {std::tuple{"rellis_os1.bin", 0.004, 0.0115}, {"handheld_os0.pcd", 100.0, 300.0},
-                                          {"ouster_intensity_7000.pcd", 150.0, 1500.0}, {"livox.pcd", 40.0, 255.0}}) {
+  for (const auto& [file, least, most] : {std::tuple{"rellis_os1.bin", 0.004, 0.0115},
+                                          {"handheld_os0.pcd", 100.0, 300.0},
+                                          {"ouster_intensity_7000.pcd", 150.0, 1500.0},
+                                          {"livox.pcd", 40.0, 255.0}}) {
     const auto scan = read_scan(shared_data() / "formats" / file);
     ASSERT_TRUE(scan);
     const IntensityScale scale = scale_of(*scan);

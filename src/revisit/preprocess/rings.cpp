@@ -61,10 +61,13 @@ std::optional<Rings> rings_from_order(const Scan& scan, const std::vector<float>
   std::size_t turn_begin = 0;
   float sum = 0.f;
   const auto end_turn = [&](std::size_t end) {
+    constexpr std::size_t kStragglers = 20;  // a few points past the start are no turn of their own
+    if (end - turn_begin < kStragglers && !means.empty()) {
+      std::fill(labels.begin() + static_cast<std::ptrdiff_t>(turn_begin),
+                labels.begin() + static_cast<std::ptrdiff_t>(end), static_cast<std::uint16_t>(means.size() - 1));
+      return;
+    }
     means.push_back(static_cast<double>(sum) / static_cast<double>(end - turn_begin));
-    turn_begin = end;
-    sum = 0.f;
-    behind_seen = false;
   };
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const Point& p = scan.points[i];
@@ -72,6 +75,9 @@ std::optional<Rings> rings_from_order(const Scan& scan, const std::vector<float>
     if (behind_seen && p.x > 0.f && p.y >= 0.f && scan.points[i - 1].x > 0.f && scan.points[i - 1].y < 0.f) {
       if (means.size() + 1 == kMostRings) return std::nullopt;
       end_turn(i);
+      turn_begin = i;
+      sum = 0.f;
+      behind_seen = false;
     }
     labels[i] = static_cast<std::uint16_t>(means.size());
     sum += elevations[i];
@@ -121,8 +127,8 @@ std::optional<Rings> rings_from_elevation(const std::vector<float>& elevations) 
   std::vector<double> histogram(kBins, 0.0);
   std::vector<std::uint16_t> bin_of(elevations.size());
   for (std::size_t i = 0; i < elevations.size(); ++i) {
-    const auto bin = static_cast<std::int32_t>((elevations[i] + static_cast<float>(kPi / 2)) *
-                                               static_cast<float>(1.0 / kBin_rad));
+    const auto bin =
+        static_cast<std::int32_t>((elevations[i] + static_cast<float>(kPi / 2)) * static_cast<float>(1.0 / kBin_rad));
     bin_of[i] = static_cast<std::uint16_t>(std::clamp<std::int32_t>(bin, 0, kBins - 1));
   }
   for (const std::uint16_t bin : bin_of) histogram[bin] += 1.0;
@@ -158,10 +164,14 @@ std::optional<Rings> rings_from_elevation(const std::vector<float>& elevations) 
 
 std::string to_string(RingSource source) {
   switch (source) {
-    case RingSource::kFile: return "named by the file";
-    case RingSource::kOrder: return "recovered from the order of the points";
-    case RingSource::kElevation: return "recovered from elevation angles";
-    case RingSource::kNone: break;
+    case RingSource::kFile:
+      return "named by the file";
+    case RingSource::kOrder:
+      return "recovered from the order of the points";
+    case RingSource::kElevation:
+      return "recovered from elevation angles";
+    case RingSource::kNone:
+      break;
   }
   return "none";
 }

@@ -48,7 +48,8 @@ TEST_P(RecoveredRings, EqualTheTrueOnesWhateverTheOrder) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sensors, RecoveredRings,
-                         testing::Values(RingCase{16, -15.0, 15.0}, RingCase{32, -30.67, 10.67}, RingCase{64, -24.8, 2.0}),
+                         testing::Values(RingCase{16, -15.0, 15.0}, RingCase{32, -30.67, 10.67},
+                                         RingCase{64, -24.8, 2.0}),
                          [](const auto& each) { return std::to_string(each.param.rings) + "_lines"; });
 
 TEST(FindRings, TakesTheFilesOwnAndNumbersThemFromBelow) {

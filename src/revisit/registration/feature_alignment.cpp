@@ -8,7 +8,6 @@
 
 #include <Eigen/Geometry>
 
-
 namespace revisit {
 namespace {
 
@@ -24,8 +23,7 @@ std::vector<Eigen::Index> nearest_columns(const Eigen::MatrixXf& a, const Eigen:
   for (Eigen::Index begin = 0; begin < a.cols(); begin += kBlock) {
     const Eigen::Index count = std::min(kBlock, a.cols() - begin);
     const Eigen::MatrixXf distances = (-2.f * (b.transpose() * a.middleCols(begin, count))).colwise() + b_norms;
-    for (Eigen::Index i = 0; i < count; ++i)
-      distances.col(i).minCoeff(&nearest[static_cast<std::size_t>(begin + i)]);
+    for (Eigen::Index i = 0; i < count; ++i) distances.col(i).minCoeff(&nearest[static_cast<std::size_t>(begin + i)]);
   }
   return nearest;
 }

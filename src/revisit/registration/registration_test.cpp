@@ -26,7 +26,8 @@ double error_m(const Pose& T, const Pose& T_truth) { return (T_truth.inverse() *
 double error_deg(const Pose& T, const Pose& T_truth) { return to_degrees(rotation_angle(T_truth.inverse() * T)); }
 
 TEST(Thin, OnePointAVoxelWhateverTheOrder) {
-  const std::vector<Point> points = {{0.1f, 0.1f, 0.1f, 0}, {0.3f, 0.1f, 0.1f, 0}, {1.5f, 0.f, 0.f, 0}, {-0.1f, 0.f, 0.f, 0}};
+  const std::vector<Point> points = {
+      {0.1f, 0.1f, 0.1f, 0}, {0.3f, 0.1f, 0.1f, 0}, {1.5f, 0.f, 0.f, 0}, {-0.1f, 0.f, 0.f, 0}};
   const ThinCloud cloud = thin(points, std::vector<std::uint8_t>{1, 1, 0, 0}, 1.0);
   EXPECT_EQ(cloud.points.size(), 3u);
   std::vector<Point> reversed(points.rbegin(), points.rend());
@@ -39,7 +40,8 @@ TEST(Thin, OnePointAVoxelWhateverTheOrder) {
 TEST(SurfaceCloud, NormalsOfAPlane) {
   ThinCloud plane;
   for (int i = 0; i < 20; ++i)
-    for (int j = 0; j < 20; ++j) plane.points.emplace_back(static_cast<float>(i), static_cast<float>(j), 0.5f * static_cast<float>(i));
+    for (int j = 0; j < 20; ++j)
+      plane.points.emplace_back(static_cast<float>(i), static_cast<float>(j), 0.5f * static_cast<float>(i));
   const SurfaceCloud cloud(plane);
   const Eigen::Vector3f expected = Eigen::Vector3f(-0.5f, 0.f, 1.f).normalized();
   for (std::size_t i = 0; i < cloud.size(); ++i) EXPECT_NEAR(std::abs(cloud.normal(i).dot(expected)), 1.f, 1e-3f);
@@ -60,7 +62,8 @@ TEST(Icp, FindsAKnownMotionFromMetresAway) {
 TEST(Icp, AgreesWithPclFromNearby) {
   const Pose T_a = SyntheticWorld::at(0, 0, 0), T_b = SyntheticWorld::at(0.3, 0.1, to_radians(1.0));
   const SurfaceCloud a(thin_scan(T_a)), b(thin_scan(T_b, 2));
-  pcl::PointCloud<pcl::PointNormal>::Ptr pa(new pcl::PointCloud<pcl::PointNormal>), pb(new pcl::PointCloud<pcl::PointNormal>);
+  pcl::PointCloud<pcl::PointNormal>::Ptr pa(new pcl::PointCloud<pcl::PointNormal>),
+      pb(new pcl::PointCloud<pcl::PointNormal>);
   for (const auto& [cloud, target] : {std::pair{&a, pa}, {&b, pb}})
     for (std::size_t i = 0; i < cloud->size(); ++i) {
       if (cloud->normal(i).squaredNorm() < 0.5f) continue;

@@ -27,9 +27,8 @@ ThinCloud thin(std::span<const Point> points, std::span<const std::uint8_t> is_g
     const Point& p = points[i];
     entries.push_back({index(p.x) << 42 | index(p.y) << 21 | index(p.z), static_cast<std::uint32_t>(i)});
   }
-  std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
-    return a.voxel != b.voxel ? a.voxel < b.voxel : a.point < b.point;
-  });
+  std::sort(entries.begin(), entries.end(),
+            [](const Entry& a, const Entry& b) { return a.voxel != b.voxel ? a.voxel < b.voxel : a.point < b.point; });
   ThinCloud cloud;
   for (std::size_t begin = 0, end = 0; begin < entries.size(); begin = end) {
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
@@ -107,7 +106,8 @@ SurfaceCloud::Neighbour SurfaceCloud::nearest(const Eigen::Vector3f& query) cons
 std::vector<SurfaceCloud::Neighbour> SurfaceCloud::nearest(const Eigen::Vector3f& query, std::size_t k) const {
   std::vector<std::uint32_t> indices(k);
   std::vector<float> distances(k);
-  const std::size_t found = tree_->index ? tree_->index->knnSearch(query.data(), k, indices.data(), distances.data()) : 0;
+  const std::size_t found =
+      tree_->index ? tree_->index->knnSearch(query.data(), k, indices.data(), distances.data()) : 0;
   std::vector<Neighbour> result;
   for (std::size_t i = 0; i < found; ++i) result.push_back({indices[i], distances[i]});
   return result;

@@ -14,9 +14,9 @@ namespace revisit {
 
 /// A scan thinned to one point a voxel: small enough to keep for every place.
 struct ThinCloud {
-  std::vector<Eigen::Vector3f> points;   ///< centroids of the voxels, metres, LiDAR frame; in an order that depends on
-                                         ///< the points alone
-  std::vector<std::uint8_t> is_ground;   ///< one a point: most of its voxel lay on the ground
+  std::vector<Eigen::Vector3f> points;  ///< centroids of the voxels, metres, LiDAR frame; in an order that depends on
+                                        ///< the points alone
+  std::vector<std::uint8_t> is_ground;  ///< one a point: most of its voxel lay on the ground
 };
 
 /// Thins `points` with cubic voxels of `voxel_m`. `is_ground` has one entry a point or is empty (nothing is ground).

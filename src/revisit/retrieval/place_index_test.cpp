@@ -36,7 +36,8 @@ TEST(PlaceIndex, ExcludesTheRecentPastByFramesAndByTime) {
   const PlaceIndex index = filled(options, 200);
   const auto latest = [&](int frame, double stamp_s) {
     std::int64_t last = -1;
-    for (const auto& each : index.search(FrameId{frame}, stamp_s, random_context(7))) last = std::max(last, each.match.value);
+    for (const auto& each : index.search(FrameId{frame}, stamp_s, random_context(7)))
+      last = std::max(last, each.match.value);
     return last;
   };
   EXPECT_EQ(latest(200, 20.0), 120) << "8 s are 80 frames here";

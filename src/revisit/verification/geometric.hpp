@@ -18,7 +18,7 @@ struct GeometricEvidence {
   std::size_t feature_matches = 0, feature_inliers = 0;  ///< FPFH; 0 where it found no transform
   bool from_features = false;  ///< ICP started from FPFH's transform, not from the descriptor's yaw
   bool consistent = false;
-  std::string reason;          ///< why not consistent
+  std::string reason;  ///< why not consistent
 };
 
 /// Geometric consistency (paper, section III-D): registers the query onto the match by ICP, from the yaw that the

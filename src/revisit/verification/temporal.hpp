@@ -13,12 +13,12 @@ namespace revisit {
 /// What the neighbours in time say about a candidate (paper, eq. 11).
 struct TemporalEvidence {
   int forward_pairs = 0, reverse_pairs = 0;  ///< pairs of which both frames were described
-  double forward_score = 0.0;  ///< mean of Phi_g + Phi_i over the pairs (query - k, match - k)
+  double forward_score = 0.0;                ///< mean of Phi_g + Phi_i over the pairs (query - k, match - k)
   double reverse_score = 0.0;  ///< the same over (query - k, match + k): the place was passed the other way
   bool reverse = false;        ///< the direction that scored higher
   double score = 0.0;          ///< the higher of both, 0 without pairs
   bool consistent = true;
-  std::string reason;          ///< why not consistent
+  std::string reason;  ///< why not consistent
 };
 
 /// The descriptor of a frame, nullptr where there is none.

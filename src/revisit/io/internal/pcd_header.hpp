@@ -22,7 +22,7 @@ struct PcdHeader {
   std::vector<Field> fields;
   std::size_t width = 0, height = 0, points = 0;
   std::string viewpoint = "0 0 0 1 0 0 0", encoding;
-  std::size_t data_offset = 0;      ///< first byte after the DATA line
+  std::size_t data_offset = 0;  ///< first byte after the DATA line
   bool padding_was_repaired = false;
 
   std::size_t point_bytes() const;

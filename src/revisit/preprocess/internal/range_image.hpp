@@ -13,8 +13,8 @@ namespace revisit::preprocess_internal {
 struct RangeImage {
   static constexpr std::int32_t kEmpty = -1;
   std::size_t rows = 0, columns = 0;
-  std::vector<std::int32_t> point_at;     ///< [row * columns + column], kEmpty where there was no return
-  std::vector<std::int32_t> pixel_of;     ///< one a point
+  std::vector<std::int32_t> point_at;  ///< [row * columns + column], kEmpty where there was no return
+  std::vector<std::int32_t> pixel_of;  ///< one a point
 
   std::int32_t at(std::size_t row, std::size_t column) const { return point_at[row * columns + column]; }
 };

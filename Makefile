@@ -1,0 +1,42 @@
+# The front door on a bare Debian 12 machine. `make demo` and `make test` install what is missing, build and run.
+.PHONY: demo test build packages bench lint format sanitize clean
+JOBS ?= $(shell nproc)
+
+demo: build
+	@scripts/demo.sh
+
+test: build
+	ctest --preset release --parallel $(JOBS)
+
+build: packages
+	@cmake --preset release --log-level=NOTICE
+	cmake --build --preset release --parallel $(JOBS)
+	@ln -sfn release/revisit build/revisit
+
+packages:
+	@scripts/install_packages.sh
+
+# Figures as a table and as JSON in out/bench; ratios, not milliseconds, are comparable between machines.
+bench: build
+	@mkdir -p out/bench
+	@for b in build/release/bin/bench_*; do $$b --benchmark_out=out/bench/$$(basename $$b).json --benchmark_out_format=json; done
+
+# The whole test suite under AddressSanitizer and UndefinedBehaviorSanitizer.
+sanitize: packages
+	@cmake --preset debug --log-level=NOTICE
+	cmake --build --preset debug --parallel $(JOBS)
+	ctest --preset debug --parallel $(JOBS)
+
+SOURCES = $(shell git ls-files '*.cpp' '*.hpp' '*.h')
+lint: build
+	@scripts/install_packages.sh clang-format clang-tidy
+	clang-format --dry-run --Werror $(SOURCES)
+	python3 scripts/check_layers.py
+	@scripts/tidy.sh $(JOBS)
+
+format:
+	@scripts/install_packages.sh clang-format
+	clang-format -i $(SOURCES)
+
+clean:
+	rm -rf build out
