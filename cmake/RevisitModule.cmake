@@ -40,4 +40,6 @@ target_compile_options(revisit_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow
 if(REVISIT_SANITIZE)
   add_compile_options(-fsanitize=${REVISIT_SANITIZE} -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${REVISIT_SANITIZE})
+  # Under ASan, Eigen would allocate otherwise than in Debian's PCL, whose buffers it then frees wrongly.
+  add_compile_definitions(EIGEN_MALLOC_ALREADY_ALIGNED=1)
 endif()
