@@ -2,14 +2,12 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <revisit/core/result.hpp>
-
-typedef struct _cairo cairo_t;
-typedef struct _cairo_surface cairo_surface_t;
 
 namespace revisit::cli {
 
@@ -49,8 +47,8 @@ class Canvas {
   Status save_png(const std::filesystem::path& file);
 
  private:
-  cairo_surface_t* surface_;
-  cairo_t* context_;
+  struct Cairo;
+  std::unique_ptr<Cairo> cairo_;
 };
 
 }  // namespace revisit::cli

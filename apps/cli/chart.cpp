@@ -13,6 +13,14 @@ double tick_step(double span) {
   return power * (lead < 1.5 ? 1.0 : lead < 3.5 ? 2.0 : lead < 7.5 ? 5.0 : 10.0);
 }
 
+std::vector<double> ticks(const Chart::Range& range, double step) {
+  std::vector<double> values;
+  const auto last = static_cast<long>(std::floor(range.max / step + 1e-9));
+  for (auto i = static_cast<long>(std::ceil(range.min / step - 1e-9)); i <= last; ++i)
+    values.push_back(static_cast<double>(i) * step);
+  return values;
+}
+
 std::string number(double value, double step) {
   char text[32];
   std::snprintf(text, sizeof text, "%.*f", step >= 1.0 ? 0 : static_cast<int>(std::ceil(-std::log10(step))),
@@ -46,12 +54,12 @@ void Chart::draw_axes(const std::string& title, const std::string& x_label, cons
   constexpr Colour kGrid{0.88, 0.88, 0.88}, kFrame{0.3, 0.3, 0.3};
   const double x_step = tick_step(x_.max - x_.min), y_step = tick_step(y_.max - y_.min);
   const double bottom = box_.y + box_.height;
-  for (double x = std::ceil(x_.min / x_step - 1e-9) * x_step; x <= x_.max + 1e-9 * x_step; x += x_step) {
+  for (const double x : ticks(x_, x_step)) {
     const Pixel p = at(x, y_.min);
     canvas_.line({{p.x, box_.y}, {p.x, bottom}}, kGrid, 1.0);
     canvas_.text({p.x, bottom + 16}, number(x, x_step), 14, Align::kCentre);
   }
-  for (double y = std::ceil(y_.min / y_step - 1e-9) * y_step; y <= y_.max + 1e-9 * y_step; y += y_step) {
+  for (const double y : ticks(y_, y_step)) {
     const Pixel p = at(x_.min, y);
     canvas_.line({{box_.x, p.y}, {box_.x + box_.width, p.y}}, kGrid, 1.0);
     canvas_.text({box_.x - 8, p.y}, number(y, y_step), 14, Align::kRight);

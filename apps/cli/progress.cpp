@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 namespace revisit::cli {
@@ -24,7 +25,7 @@ void Progress::update(std::size_t done) {
   const double seconds = std::chrono::duration<double>(now - start_).count();
   const double rate = seconds > 0.0 ? static_cast<double>(done) / seconds : 0.0;
   const double share = total_ == 0 ? 1.0 : static_cast<double>(done) / static_cast<double>(total_);
-  const auto left_s = rate > 0.0 ? static_cast<long>(static_cast<double>(total_ - done) / rate + 0.5) : 0L;
+  const long left_s = rate > 0.0 ? std::lround(static_cast<double>(total_ - done) / rate) : 0L;
   if (!is_terminal_) {
     const auto tenths = static_cast<std::size_t>(share * 10.0);
     if (tenths <= tenths_printed_) return;

@@ -23,7 +23,8 @@ struct IntensityScanContext {
 
   std::size_t cells() const { return intensity.size(); }
   bool occupied(int ring, int sector) const {
-    const auto bit = static_cast<std::size_t>(sector * rings + ring);
+    const auto bit =
+        static_cast<std::size_t>(sector) * static_cast<std::size_t>(rings) + static_cast<std::size_t>(ring);
     return (occupancy[bit / 64] >> (bit % 64) & 1u) != 0;
   }
   int occupied_cells() const;
