@@ -1,17 +1,21 @@
 # The front door on a bare Debian 12 machine. `make demo` and `make test` install what is missing, build and run.
-.PHONY: demo test build packages bench lint format sanitize clean
+.PHONY: demo test build configure packages bench lint format sanitize clean
 JOBS ?= $(shell nproc)
 
-demo: build
+demo: packages configure
+	cmake --build --preset release --parallel $(JOBS) --target revisit
+	@ln -sfn release/revisit build/revisit
 	@scripts/demo.sh
 
 test: build
 	ctest --preset release --parallel $(JOBS)
 
-build: packages
-	@cmake --preset release --log-level=NOTICE
+build: packages configure
 	cmake --build --preset release --parallel $(JOBS)
 	@ln -sfn release/revisit build/revisit
+
+configure: packages
+	@cmake --preset release --log-level=NOTICE > /dev/null
 
 packages:
 	@scripts/install_packages.sh
@@ -23,7 +27,7 @@ bench: build
 
 # The whole test suite under AddressSanitizer and UndefinedBehaviorSanitizer.
 sanitize: packages
-	@cmake --preset debug --log-level=NOTICE
+	@cmake --preset debug --log-level=NOTICE > /dev/null
 	cmake --build --preset debug --parallel $(JOBS)
 	ctest --preset debug --parallel $(JOBS)
 

@@ -124,9 +124,30 @@ TEST(Cli, DetectAndEvaluateARecordingWithLoops) {
   for (const char* name : {"precision_recall.png", "trajectory.png", "report.html"})
     EXPECT_GT(fs::file_size(out / name), 1000u) << name;
 
+  EXPECT_EQ(
+      run("evaluate " + out.string() + " --reference " + (recording / "poses.txt").string() + " --exclude-frames -5")
+          .code,
+      2);
+  EXPECT_EQ(
+      run("evaluate " + out.string() + " --reference " + (recording / "poses.txt").string() + " --exclude-s nan").code,
+      2);
+  // What detect writes beside its results serves as a reference too, in both frames.
+  for (const char* own : {"poses.txt", "poses.tum"}) {
+    const Outcome scored = run("evaluate " + out.string() + " --reference " + (out / own).string());
+    EXPECT_EQ(scored.code, 0) << scored.output;
+    EXPECT_NE(content(out / "evaluation.json").find("\"false_loops\": 0"), std::string::npos) << own;
+  }
+
   const Outcome again = run("detect " + recording.string() + " --out " + out.string());
   EXPECT_EQ(again.code, 1);
   EXPECT_NE(again.output.find("--overwrite"), std::string::npos) << "results are not lost by a second run";
+}
+
+TEST(Cli, ASearchWithoutAPastSaysSo) {
+  const fs::path folder = fresh_folder(), recording = there_and_back(folder / "recording");
+  const Outcome outcome = run("detect " + recording.string() + " --out " + (folder / "out").string());
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_NE(outcome.output.find("no scan had a searchable past"), std::string::npos) << outcome.output;
 }
 
 TEST(Cli, ABrokenScanAmongGoodOnesIsSkippedAndTold) {
@@ -158,7 +179,7 @@ TEST(Cli, RecordingsOfNoUseFailWithAMessage) {
         run("detect " + recording.string() + " --out " + (folder / "out").string() + " --overwrite");
     EXPECT_EQ(outcome.code, 1) << each.name << ": " << outcome.output;
     EXPECT_NE(outcome.output.find(each.message), std::string::npos) << outcome.output;
-    EXPECT_EQ(run("describe " + (recording / "000000.bin").string() + " " + (folder / "a.png").string()).code, 1)
+    EXPECT_EQ(run("describe " + (recording / "000000.bin").string() + " --out " + (folder / "a.png").string()).code, 1)
         << each.name;
   }
   EXPECT_NE(run("detect /no/such --out /tmp/x").output.find("/no/such: no such folder"), std::string::npos);
@@ -198,7 +219,11 @@ TEST(Cli, AFullDiskIsToldNotIgnored) {
               std::string::npos)
         << outcome.output;
   }
-  EXPECT_EQ(run("describe " + (recording / "velodyne" / "000000.bin").string() + " /dev/full").code, 1);
+  fs::create_symlink("/dev/full", folder / "full.png");
+  EXPECT_EQ(
+      run("describe " + (recording / "velodyne" / "000000.bin").string() + " --out " + (folder / "full.png").string())
+          .code,
+      1);
 }
 
 TEST(Cli, AFolderThatMayNotBeReadIsNamed) {
@@ -269,6 +294,10 @@ TEST(Cli, DescribeDrawsAndInfoTells) {
   for (const char* fact :
        {"KITTI odometry folder", "scans        12", "poses        12", "rate         1.00 Hz", "rings        32"})
     EXPECT_NE(info.output.find(fact), std::string::npos) << fact << "\n" << info.output;
+  for (const char* wrong : {"a.jpg", "000000.bin", "no/such/folder/a.png"})
+    EXPECT_EQ(run("describe " + scan + " --out " + (folder / wrong).string()).code, 2) << "nothing else is overwritten";
+  EXPECT_NE(run("describe " + recording.string() + " --out " + (folder / "b.png").string()).output.find("is a folder"),
+            std::string::npos);
   EXPECT_EQ(run("info " + scan).code, 0);
   EXPECT_EQ(run("info /no/such.bin").code, 1);
 }
@@ -282,8 +311,8 @@ TEST(Cli, CalibrateLearnsAndDetectApplies) {
       run("detect " + recording.string() + " --out " + (folder / "out").string() + " --calibration " + phi.string());
   EXPECT_EQ(apply.code, 0) << apply.output;
   std::ofstream(phi) << "{}";
-  EXPECT_EQ(run("describe " + (recording / "velodyne" / "000000.bin").string() + " " + (folder / "a.png").string() +
-                " --calibration " + phi.string())
+  EXPECT_EQ(run("describe " + (recording / "velodyne" / "000000.bin").string() + " --out " +
+                (folder / "a.png").string() + " --calibration " + phi.string())
                 .code,
             1);
 }

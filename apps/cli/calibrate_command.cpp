@@ -12,7 +12,7 @@ namespace revisit::cli {
 namespace {
 
 struct Options {
-  std::string input, out;
+  std::string input, out, poses;
   std::size_t scans = 100;
   ParameterFlags parameters;
 };
@@ -20,7 +20,8 @@ struct Options {
 int calibrate(const Options& options) {
   const auto parameters = options.parameters.resolve();
   if (!parameters) return fail(parameters.error(), kUsage);
-  const auto recording = open_recording(options.input, print_log());
+  if (const Status status = check_output(options.out, ".json"); !status) return fail(status.error(), kUsage);
+  const auto recording = open_recording(options.input, print_log(), options.poses);
   if (!recording) return fail(recording.error());
   listen_for_interrupt();
   Result<CalibrationReport> report = Error{};
@@ -68,7 +69,8 @@ Run add_calibrate(CLI::App& program) {
   command->add_option("--scans", options->scans, "Learn from the first scans only")
       ->capture_default_str()
       ->check(CLI::Range(2, 200));
-  options->parameters.add_to(*command);
+  command->add_option("--poses", options->poses, "Pose file (KITTI, TUM, g2o), instead of the recording's own poses");
+  options->parameters.add_to(*command, {"preprocess", "intensity", "geometric"});
   return [options] { return calibrate(*options); };
 }
 

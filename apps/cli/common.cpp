@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common.hpp"
 
+#include <algorithm>
 #include <csignal>
 
 #include <spdlog/sinks/stdout_color_sinks.h>
@@ -30,13 +31,15 @@ spdlog::logger& logger() {
 
 }  // namespace
 
-void ParameterFlags::add_to(CLI::App& command) {
+void ParameterFlags::add_to(CLI::App& command, const std::vector<std::string>& sections) {
   std::string presets;
   for (const auto& name : preset_names()) presets += (presets.empty() ? "" : ", ") + name;
   command.add_option("--preset", preset_, "Parameters to start from: " + presets)->capture_default_str();
   command.add_option("--parameters", file_,
                      "TOML file of parameters, over the preset (`revisit parameters` prints one)");
   for (const ParameterInfo& info : parameter_infos()) {
+    const std::string section = info.name.substr(0, info.name.find('.'));
+    if (!sections.empty() && std::find(sections.begin(), sections.end(), section) == sections.end()) continue;
     const std::string range =
         info.is_switch ? "true or false" : CLI::detail::to_string(info.min) + " to " + CLI::detail::to_string(info.max);
     command
@@ -76,6 +79,20 @@ LogSink print_log() {
 int fail(const Error& error, int code) {
   logger().error(error.message);
   return code;
+}
+
+Status check_output(const std::string& file, const std::string& extension) {
+  const std::filesystem::path path = file;
+  if (path.extension() != extension) return Error{file + ": is written as " + extension + "; name it so"};
+  std::error_code failure;
+  const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+  if (!std::filesystem::is_directory(folder, failure)) return Error{folder.string() + ": no such folder"};
+  return ok();
+}
+
+std::vector<std::string>& program_arguments() {
+  static std::vector<std::string> arguments;
+  return arguments;
 }
 
 void listen_for_interrupt() {

@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -37,7 +38,8 @@ Run add_parameters(CLI::App& program);
 /// The flags that choose parameters: --preset, --parameters FILE, and one flag a parameter, in this order of strength.
 class ParameterFlags {
  public:
-  void add_to(CLI::App& command);
+  /// Only the parameters of the named sections become flags; all where none is named.
+  void add_to(CLI::App& command, const std::vector<std::string>& sections = {});
   Result<Parameters> resolve() const;
 
  private:
@@ -53,6 +55,12 @@ Result<IntensityCalibration> load_calibration(const std::string& file);
 LogSink print_log();
 /// Prints the error and what the shell is told.
 int fail(const Error& error, int code = kFailed);
+
+/// Why the file cannot be the output of a command: another ending than `extension`, or a folder that does not exist.
+Status check_output(const std::string& file, const std::string& extension);
+
+/// What the shell passed to the program, its own name left out.
+std::vector<std::string>& program_arguments();
 
 /// True from the first Ctrl-C on. The second one ends the program at once.
 void listen_for_interrupt();

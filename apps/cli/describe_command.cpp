@@ -21,6 +21,9 @@ int describe(const Options& options) {
   if (!parameters) return fail(parameters.error(), kUsage);
   const auto calibration = load_calibration(options.calibration);
   if (!calibration) return fail(calibration.error());
+  if (const Status status = check_output(options.picture, ".png"); !status) return fail(status.error(), kUsage);
+  if (std::error_code failure; std::filesystem::is_directory(options.scan, failure))
+    return fail({options.scan + ": is a folder; name one scan of it"});
   auto scan = read_scan(options.scan, print_log());
   if (!scan) return fail(scan.error());
   const IntensityScale scale = estimate_intensity_scale(std::span<const Scan>(&*scan, 1), parameters->intensity);
@@ -31,7 +34,7 @@ int describe(const Options& options) {
   const std::string name = std::filesystem::path(options.scan).filename().string();
   const auto& ground = prepared->ground;
   char title[256];
-  std::snprintf(title, sizeof title, "%s: %zu points, rings: %s (%zu), intensity full scale %.4g", name.c_str(),
+  std::snprintf(title, sizeof title, "%s: %zu points, laser rings: %s (%zu), intensity full scale %.4g", name.c_str(),
                 prepared->scan.points.size(), to_string(ground.rings).c_str(), ground.ring_count, scale.full_scale);
   if (const Status status = draw_description(options.picture, *prepared, *parameters, title); !status)
     return fail(status.error());
@@ -44,11 +47,11 @@ int describe(const Options& options) {
 Run add_describe(CLI::App& program) {
   auto options = std::make_shared<Options>();
   CLI::App* command = program.add_subcommand("describe", "Draw one scan from above beside its descriptor.");
-  command->footer("Example: revisit describe 000042.bin scan.png --preset paper");
+  command->footer("Example: revisit describe 000042.bin --out scan.png --preset paper");
   command->add_option("scan", options->scan, "Scan: .bin, .pcd or .ply")->required();
-  command->add_option("picture,--out", options->picture, "The picture to write, .png")->required();
+  command->add_option("--out", options->picture, "The picture to write, .png")->required();
   command->add_option("--calibration", options->calibration, "Intensity calibration made by `revisit calibrate`");
-  options->parameters.add_to(*command);
+  options->parameters.add_to(*command, {"preprocess", "intensity", "descriptor"});
   return [options] { return describe(*options); };
 }
 

@@ -17,7 +17,7 @@ namespace revisit::cli {
 namespace {
 
 struct Options {
-  std::string input, out, database, calibration;
+  std::string input, out, database, calibration, poses;
   bool overwrite = false;
   ParameterFlags parameters;
 };
@@ -74,6 +74,10 @@ Status detect_all(LoopDetector& detector, const Recording& recording, ResultWrit
     Stopwatch watch;
     auto scan = recording.read(i);
     run.ms_total["read"] += watch.lap_ms();
+    if (scan) {
+      run.counts["dropped_non_finite"] += scan->dropped_non_finite;
+      run.counts["dropped_at_origin"] += scan->dropped_at_origin;
+    }
     auto detection = !scan ? Result<Detection>(scan.error())
                      : run.database.empty()
                          ? detector.process(*std::move(scan), recording.trajectory().at(recording.frame(i)))
@@ -93,6 +97,9 @@ Status detect_all(LoopDetector& detector, const Recording& recording, ResultWrit
 
 Status write_poses(const std::filesystem::path& folder, const Recording& recording) {
   if (recording.trajectory().empty()) return ok();
+  // poses.txt is in the camera's frame where there is one, and means nothing without its calibration.
+  if (const auto T_camera_lidar = recording.T_camera_lidar())
+    if (const Status status = write_camera_calibration(folder / "calib.txt", *T_camera_lidar); !status) return status;
   if (const Status status = write_kitti_poses(folder / "poses.txt", recording.trajectory(), recording.T_camera_lidar());
       !status)
     return status;
@@ -104,7 +111,7 @@ int detect(const Options& options) {
   if (!parameters) return fail(parameters.error(), kUsage);
   const auto calibration = load_calibration(options.calibration);
   if (!calibration) return fail(calibration.error());
-  const auto recording = open_recording(options.input, print_log());
+  const auto recording = open_recording(options.input, print_log(), options.poses);
   if (!recording) return fail(recording.error());
   Result<std::unique_ptr<Recording>> database = std::unique_ptr<Recording>();
   if (!options.database.empty()) database = open_recording(options.database, print_log());
@@ -112,14 +119,22 @@ int detect(const Options& options) {
 
   RunFile run;
   run.command = "detect";
-  run.input = options.input;
-  run.database = options.database;
+  // Absolute, so that `evaluate` finds them from any folder.
+  const auto absolute = [](const std::string& path) {
+    return path.empty() ? path : std::filesystem::absolute(path).lexically_normal().string();
+  };
+  run.arguments = program_arguments();
+  run.input = absolute(options.input);
+  run.database = absolute(options.database);
+  run.poses = absolute(options.poses);
+  run.calibration = absolute(options.calibration);
   run.parameters = *parameters;
   const Recording& scale_source = *database ? **database : **recording;
   const auto scale = estimate_intensity_scale(scale_source, *parameters);
   if (!scale) return fail({scale.error().message + "; no scan can be used"});
   run.intensity = *scale;
-  if (!scale->warning.empty()) print_log()(LogLevel::kWarning, scale->warning);
+  if (!scale->warning.empty())
+    print_log()(LogLevel::kWarning, (*database ? options.database : options.input) + ": " + scale->warning);
 
   auto writer = ResultWriter::create(options.out, options.overwrite);
   if (!writer) return fail(writer.error());
@@ -138,6 +153,13 @@ int detect(const Options& options) {
   for (const Status* each : {&std::as_const(status), &finished, &described})
     if (!*each) return fail(each->error());
 
+  if (run.interrupted) print_log()(LogLevel::kWarning, "interrupted: the results hold what was computed until now");
+  if (run.counts["queries_with_past"] == 0 && run.counts["scans"] > 0)
+    print_log()(LogLevel::kWarning,
+                "no scan had a searchable past: places fewer than " +
+                    std::to_string(parameters->retrieval.exclude_frames) + " frames or " +
+                    get_parameter(*parameters, "retrieval.exclude_s") +
+                    " s before it are not searched (--retrieval.exclude_frames, --retrieval.exclude_s)");
   std::cout << run.counts["scans"] << " scans, " << run.counts["loops"] << " loops, " << run.skipped.size()
             << " scans skipped: " << options.out << "/loops.csv\n";
   if (run.interrupted) return kInterrupted;
@@ -154,7 +176,7 @@ Run add_detect(CLI::App& program) {
       "Writes into the folder of --out (formats: docs/formats.md):\n"
       "  candidates.csv  one row a scan that had a searchable past: what it looked like, and why it was refused\n"
       "  loops.csv       one row an accepted loop, with its 6-DoF pose T_match_query\n"
-      "  poses.txt/.tum  the poses that came with the recording, if any\n"
+      "  poses.txt/.tum  the poses that came with the recording, if any, and the calib.txt that poses.txt needs\n"
       "  run.json        version, parameters, counts, milliseconds a stage\n\n"
       "Example: revisit detect kitti/sequences/00 --out results/00");
   command->add_option("input", options->input, "Recording: KITTI folder, KITTI raw drive, or folder of scans")
@@ -162,6 +184,8 @@ Run add_detect(CLI::App& program) {
   command->add_option("--out", options->out, "Folder for the results")->required();
   command->add_option("--database", options->database,
                       "Look for the scans of the recording in this other one (a map) instead of in its own past");
+  command->add_option("--poses", options->poses,
+                      "Pose file (KITTI, TUM, g2o), instead of the recording's own poses; never used to find loops");
   command->add_option("--calibration", options->calibration, "Intensity calibration made by `revisit calibrate`");
   command->add_flag("--overwrite", options->overwrite, "Replace results that are already in the folder");
   options->parameters.add_to(*command);

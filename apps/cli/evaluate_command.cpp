@@ -24,54 +24,60 @@ struct Options {
 
 using Stamps = std::vector<std::pair<FrameId, double>>;
 
-// LiDAR poses of the recording's frames from a pose file. Without the recording every row is a frame of its own, 0.1 s
-// apart, unless a times.txt stands beside the file.
+Stamps stamps_of(const Recording& recording) {
+  Stamps stamps;
+  for (std::size_t i = 0; i < recording.size(); ++i) stamps.emplace_back(recording.frame(i), recording.stamp_s(i));
+  return stamps;
+}
+
+// The calibration of a camera that KITTI poses belong to: as named, beside the poses, or the recording's own.
+Result<std::optional<Pose>> find_camera_calibration(const Options& options, const Recording* recording) {
+  const fs::path beside = fs::path(options.reference).parent_path() / "calib.txt";
+  std::error_code failure;
+  const fs::path file = !options.calibration.empty() ? fs::path(options.calibration) : beside;
+  if (!options.calibration.empty() || fs::exists(beside, failure)) {
+    const auto calibration = read_camera_calibration(file);
+    if (!calibration) return calibration.error();
+    return std::optional<Pose>(*calibration);
+  }
+  if (recording != nullptr && recording->T_camera_lidar()) return recording->T_camera_lidar();
+  print_log()(LogLevel::kWarning, options.reference +
+                                      ": no calib.txt beside it: its poses are taken as poses of the LiDAR. Name the "
+                                      "calibration of a KITTI sequence with --camera-calibration");
+  return std::optional<Pose>();
+}
+
+// LiDAR poses of the recording's frames. Without the recording every row of the reference is a frame, 0.1 s apart.
 Result<Trajectory> load_reference(const Options& options, const Recording* recording) {
-  if (fs::is_directory(options.reference)) {
+  Trajectory all;
+  std::error_code failure;
+  if (fs::is_directory(options.reference, failure)) {
     const auto other = open_recording(options.reference, print_log());
     if (!other) return other.error();
-    if ((*other)->trajectory().empty()) return Error{options.reference + ": this recording has no poses"};
-    return (*other)->trajectory();
+    all = (*other)->trajectory();
+  } else {
+    const auto poses = read_poses(options.reference);
+    if (!poses) return poses.error();
+    if (poses->format == PoseFormat::kTum && recording == nullptr)
+      return Error{options.reference +
+                   ": TUM poses go by time, and the times are the recording's: name it with --recording"};
+    Result<std::optional<Pose>> T_camera_lidar = std::optional<Pose>();
+    if (poses->format == PoseFormat::kKitti) T_camera_lidar = find_camera_calibration(options, recording);
+    if (!T_camera_lidar) return T_camera_lidar.error();
+    all = to_trajectory(*poses, *T_camera_lidar, recording == nullptr ? Stamps() : stamps_of(*recording));
   }
-  const auto poses = read_poses(options.reference);
-  if (!poses) return poses.error();
-  std::optional<Pose> T_camera_lidar;
-  if (poses->format == PoseFormat::kKitti) {
-    const fs::path beside = fs::path(options.reference).parent_path() / "calib.txt";
-    const std::string file = !options.calibration.empty() ? options.calibration
-                             : fs::exists(beside)         ? beside.string()
-                                                          : "";
-    if (!file.empty()) {
-      const auto calibration = read_camera_calibration(file);
-      if (!calibration) return calibration.error();
-      T_camera_lidar = *calibration;
-    } else if (recording != nullptr && recording->T_camera_lidar()) {
-      T_camera_lidar = recording->T_camera_lidar();
-    } else {
-      print_log()(LogLevel::kWarning, options.reference +
-                                          ": no calib.txt beside it: its poses are taken as poses of the LiDAR. Name "
-                                          "the calibration of a KITTI sequence with --camera-calibration");
-    }
-  }
-  Stamps stamps;
-  if (recording != nullptr) {
-    for (std::size_t i = 0; i < recording->size(); ++i) stamps.emplace_back(recording->frame(i), recording->stamp_s(i));
-  } else if (poses->format == PoseFormat::kTum) {
-    for (std::size_t i = 0; i < poses->rows.size(); ++i)
-      stamps.emplace_back(FrameId{static_cast<std::int64_t>(i)}, *poses->rows[i].stamp_s);
-    print_log()(LogLevel::kWarning, "the recording is unknown: row i of " + options.reference + " is taken as frame i");
-  }
-  Trajectory trajectory = to_trajectory(*poses, T_camera_lidar, stamps);
+  if (all.empty()) return Error{options.reference + ": holds no pose for a frame of the recording"};
+  if (recording == nullptr) return all;
   // Frames that the recording leaves out can neither ask nor answer.
-  if (recording != nullptr) {
-    Trajectory present;
-    for (const auto& [frame, stamp_s] : stamps)
-      if (const auto found = trajectory.entries.find(frame); found != trajectory.entries.end())
-        present.entries.insert(*found);
-    trajectory = std::move(present);
-  }
-  if (trajectory.empty()) return Error{options.reference + ": no pose belongs to a frame of the recording"};
-  return trajectory;
+  Trajectory present;
+  for (const auto& [frame, stamp_s] : stamps_of(*recording))
+    if (const auto pose = all.at(frame)) present.entries[frame] = {stamp_s, *pose};
+  if (present.empty()) return Error{options.reference + ": holds no pose for a frame of the recording"};
+  if (2 * present.entries.size() < recording->size())
+    print_log()(LogLevel::kWarning, options.reference + ": has poses for " + std::to_string(present.entries.size()) +
+                                        " of " + std::to_string(recording->size()) +
+                                        " frames: does it belong to another recording?");
+  return present;
 }
 
 int evaluate(const Options& options) {
@@ -81,7 +87,8 @@ int evaluate(const Options& options) {
   const auto loops = read_loops(folder / "loops.csv");
   if (!loops) return fail(loops.error());
   RunFacts facts;
-  if (fs::exists(folder / "run.json")) {
+  std::error_code failure;
+  if (fs::exists(folder / "run.json", failure)) {
     const auto run = read_run(folder / "run.json");
     if (!run) return fail(run.error());
     facts = *run;
@@ -92,15 +99,18 @@ int evaluate(const Options& options) {
 
   const std::string recording_folder = !options.recording.empty() ? options.recording : facts.input;
   std::unique_ptr<Recording> recording;
-  if (!recording_folder.empty() && fs::exists(recording_folder)) {
+  if (!options.recording.empty() || fs::exists(recording_folder, failure)) {
     auto opened = open_recording(recording_folder, print_log());
     if (!opened) return fail(opened.error());
     recording = *std::move(opened);
-  } else if (!options.recording.empty()) {
-    return fail({options.recording + ": no such folder"});
   } else {
-    print_log()(LogLevel::kWarning, "the recording is not there: every pose of the reference counts as a frame of it");
+    print_log()(LogLevel::kWarning,
+                "the recording '" + recording_folder +
+                    "' is not there: every pose of the reference counts as a frame of it. Name it with --recording");
   }
+  if (facts.interrupted)
+    print_log()(LogLevel::kWarning,
+                options.results + ": this run was interrupted; frames it did not reach count as missed");
 
   EvaluationReport report;
   report.results = options.results;
@@ -109,6 +119,10 @@ int evaluate(const Options& options) {
   report.rules.exclude_frames =
       options.exclude_frames.value_or(facts.exclude_frames.value_or(report.rules.exclude_frames));
   report.rules.exclude_s = options.exclude_s.value_or(facts.exclude_s.value_or(report.rules.exclude_s));
+  if (report.rules.exclude_frames < 1 || !(report.rules.exclude_s >= 0.0))
+    return fail({"matches excluded below " + std::to_string(report.rules.exclude_frames) + " frames and " +
+                 std::to_string(report.rules.exclude_s) + " s; allowed: from 1 frame and from 0 s on"},
+                kUsage);
   const auto trajectory = load_reference(options, recording.get());
   if (!trajectory) return fail(trajectory.error());
   const Reference reference(*trajectory, report.rules);
@@ -116,6 +130,9 @@ int evaluate(const Options& options) {
   report.reverse_retrieval = evaluate_retrieval(*candidates, reference, RevisitKind::kReverse);
   report.loops = evaluate_loops(*loops, reference);
 
+  if (report.loops.without_reference > 0)
+    print_log()(LogLevel::kWarning, std::to_string(report.loops.without_reference) +
+                                        " accepted loops have no reference pose and are not judged");
   std::cout << to_text(report);
   for (const Status& status :
        {draw_precision_recall(folder / "precision_recall.png", report.retrieval, report.reverse_retrieval),

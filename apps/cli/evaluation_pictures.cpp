@@ -15,7 +15,9 @@ void draw_curve(Canvas& canvas, const Chart& chart, const RetrievalTable& table,
   std::vector<Pixel> line;
   for (const PrecisionRecall& point : table.curve) line.push_back(chart.at(point.recall, point.precision));
   canvas.line(line, colour, 2.5);
-  if (line.size() == 1) canvas.dot(line[0], 4, colour);
+  constexpr std::size_t kFew = 60;  // single answers can be told apart
+  if (line.size() <= kFew)
+    for (const Pixel& point : line) canvas.dot(point, 3.5, colour);
 }
 
 void draw_legend_entry(Canvas& canvas, Pixel at, const char* name, const RetrievalTable& table, const Colour& colour) {
@@ -39,6 +41,7 @@ Status draw_precision_recall(const std::filesystem::path& file, const RetrievalT
     draw_curve(canvas, chart, reverse, kReverse);
     draw_legend_entry(canvas, {90, 720}, "reverse", reverse, kReverse);
   }
+  if (all.revisits > 0 && all.curve.empty()) canvas.text({475, 340}, "no answers", 18, Align::kCentre);
   if (all.revisits == 0) canvas.text({475, 340}, "no revisits in this recording", 18, Align::kCentre);
   return canvas.save_png(file);
 }

@@ -89,7 +89,7 @@ Run add_info(CLI::App& program) {
       "info", "Tell what a recording or a single scan file holds: sensor, rings, rate, intensity, poses.");
   command->footer("Example: revisit info kitti/sequences/00; revisit info cloud.pcd");
   command->add_option("input", options->input, "Recording or scan file")->required();
-  options->parameters.add_to(*command);
+  options->parameters.add_to(*command, {"intensity"});
   return [options]() -> int {
     const auto parameters = options->parameters.resolve();
     if (!parameters) return fail(parameters.error(), kUsage);

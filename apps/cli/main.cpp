@@ -21,6 +21,7 @@ int main(int argc, char** argv) {
   program.require_subcommand(1);
   program.get_formatter()->column_width(38);
 
+  program_arguments().assign(argv + 1, argv + argc);
   std::vector<std::pair<CLI::App*, Run>> commands;
   for (const auto add : {add_info, add_describe, add_detect, add_evaluate, add_calibrate, add_parameters}) {
     Run run = add(program);

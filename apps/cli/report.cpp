@@ -29,8 +29,9 @@ Table table_1(const EvaluationReport& report) {
   Table table = {{"", "revisits", "answers", "R@1", "F1max", "AP", "R@P100", "EP"}};
   const auto add = [&](const char* name, const RetrievalTable& t) {
     const auto figure = [&](double value) { return t.revisits == 0 ? std::string("-") : format("%.3f", value); };
-    table.push_back({name, std::to_string(t.revisits), std::to_string(t.answers), figure(t.recall_at_1),
-                     figure(t.f1_max), figure(t.average_precision), figure(t.recall_at_p100),
+    const bool nothing_reverse = &t == &report.reverse_retrieval && t.revisits == 0;
+    table.push_back({name, std::to_string(t.revisits), nothing_reverse ? "-" : std::to_string(t.answers),
+                     figure(t.recall_at_1), figure(t.f1_max), figure(t.average_precision), figure(t.recall_at_p100),
                      figure(t.extended_precision)});
   };
   add("all", report.retrieval);
@@ -81,6 +82,7 @@ std::string rules_text(const EvaluationReport& report) {
       "Frames at least %d frames and %.1f s older may be matched; the same place is within %.1f m; a loop is right "
       "within %.1f m and %.1f degrees.",
       rules.exclude_frames, rules.exclude_s, rules.same_place_m, rules.right_translation_m, rules.right_rotation_deg);
+  text += " An answer farther away is false in table 1, though its pose may be right in table 2.";
   if (report.loops.without_reference > 0)
     text += format(" %zu accepted loops have no reference pose and are not judged.", report.loops.without_reference);
   return text;
@@ -135,8 +137,11 @@ std::string to_html(const EvaluationReport& report) {
          "th,td{border:1px solid #bbb;padding:.3em .7em;text-align:right}img{max-width:100%}</style>\n"
          "<h1>Loop closures</h1>\n<p>Results: " +
          escape(report.results) + "<br>Reference: " + escape(report.reference) + "</p>\n<p>" + rules_text(report) +
-         "</p>\n<h2>Table 1, retrieval</h2>\n" + to_html(table_1(report)) + "<h2>Table 2, loop constraints</h2>\n" +
-         to_html(table_2(report)) +
+         "</p>\n<h2>Table 1, retrieval</h2>\n" + to_html(table_1(report)) +
+         "<p>R@1: recall without a threshold. F1max: best harmonic mean of precision and recall. AP: area under the "
+         "curve. "
+         "R@P100: recall before the first false answer. EP: mean of the first precision and R@P100.</p>\n" +
+         "<h2>Table 2, loop constraints</h2>\n" + to_html(table_2(report)) +
          "<h2>Trajectory and loops</h2>\n<img src=\"trajectory.png\" alt=\"trajectory with loops\">\n"
          "<h2>Precision and recall</h2>\n<img src=\"precision_recall.png\" alt=\"precision over recall\">\n</html>\n";
 }

@@ -10,13 +10,12 @@
 namespace revisit::cli {
 
 Status write_run(const std::filesystem::path& file, const RunFile& run) {
-  nlohmann::ordered_json document = {{"program", "revisit"},
-                                     {"version", REVISIT_VERSION},
-                                     {"command", run.command},
-                                     {"input", run.input},
-                                     {"database", run.database},
-                                     {"interrupted", run.interrupted},
-                                     {"parameters", nlohmann::ordered_json::object()}};
+  nlohmann::ordered_json document = {
+      {"program", "revisit"},           {"version", REVISIT_VERSION},
+      {"command", run.command},         {"input", run.input},
+      {"database", run.database},       {"poses", run.poses},
+      {"calibration", run.calibration}, {"arguments", run.arguments},
+      {"interrupted", run.interrupted}, {"parameters", nlohmann::ordered_json::object()}};
   for (const ParameterInfo& info : parameter_infos()) {
     const std::string value = get_parameter(run.parameters, info.name);
     document["parameters"][info.name] = nlohmann::ordered_json::parse(value);
@@ -44,6 +43,7 @@ Result<RunFacts> read_run(const std::filesystem::path& file) {
   try {
     facts.input = document.value("input", "");
     facts.database = document.value("database", "");
+    facts.interrupted = document.value("interrupted", false);
     const auto parameters = document.value("parameters", nlohmann::json::object());
     if (parameters.contains("retrieval.exclude_frames"))
       facts.exclude_frames = parameters.at("retrieval.exclude_frames").get<int>();

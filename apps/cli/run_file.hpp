@@ -15,7 +15,8 @@ namespace revisit::cli {
 
 /// run.json: what was run, on what, and what it cost.
 struct RunFile {
-  std::string command, input, database;
+  std::string command, input, database, poses, calibration;
+  std::vector<std::string> arguments;  ///< as given to the program
   Parameters parameters;
   IntensityScale intensity;
   std::map<std::string, std::size_t> counts;
@@ -29,6 +30,7 @@ Status write_run(const std::filesystem::path& file, const RunFile& run);
 /// What `evaluate` needs of a run; absent entries where the file does not have them.
 struct RunFacts {
   std::string input, database;
+  bool interrupted = false;
   std::optional<int> exclude_frames;
   std::optional<double> exclude_s;
 };

@@ -11,10 +11,13 @@ namespace {
 
 constexpr Colour kEmpty{0.93, 0.93, 0.95}, kGround{0.80, 0.80, 0.80}, kGrid{0.55, 0.55, 0.60, 0.45};
 
-void draw_from_above(Canvas& canvas, const PreparedScan& prepared, const DescriptorOptions& options) {
+void draw_from_above(Canvas& canvas, const PreparedScan& prepared, const Parameters& parameters) {
+  const DescriptorOptions& options = parameters.descriptor;
   const double reach_m = options.max_range_m;
   Chart chart(canvas, {90, 70, 720, 720}, {-reach_m, reach_m}, {-reach_m, reach_m}, true);
-  chart.draw_axes("the scan from above: colour = intensity, grey = ground", "x, forward (m)", "y, left (m)");
+  chart.draw_axes(parameters.preprocess.remove_ground ? "the scan from above; grey: ground, left out of the descriptor"
+                                                      : "the scan from above; grey: ground, kept in the descriptor",
+                  "x, forward (m)", "y, left (m)");
   canvas.clip(chart.box());
   const auto& points = prepared.scan.points;
   for (const bool ground : {true, false})  // what stands up is drawn over the ground
@@ -32,6 +35,7 @@ void draw_from_above(Canvas& canvas, const PreparedScan& prepared, const Descrip
     canvas.line({chart.at(0, 0), chart.at(reach_m * std::cos(angle), reach_m * std::sin(angle))}, kGrid, 1.0);
   }
   canvas.dot(chart.at(0, 0), 4, {0.85, 0.1, 0.1});
+  canvas.text({100, 778}, "circles: every 5th ring of the grid", 12);
   canvas.unclip();
 }
 
@@ -45,7 +49,9 @@ void draw_descriptor(Canvas& canvas, const IntensityScanContext& descriptor, con
   const double width = box.width / descriptor.sectors, height = box.height / descriptor.rings;
   for (int sector = 0; sector < descriptor.sectors; ++sector)
     for (int ring = 0; ring < descriptor.rings; ++ring) {
-      const auto value = descriptor.intensity[static_cast<std::size_t>(sector * descriptor.rings + ring)];
+      const auto value =
+          descriptor.intensity[static_cast<std::size_t>(sector) * static_cast<std::size_t>(descriptor.rings) +
+                               static_cast<std::size_t>(ring)];
       const Box cell{box.x + sector * width, box.y + box.height - (ring + 1) * height, width + 0.5, height + 0.5};
       canvas.fill(cell, descriptor.occupied(ring, sector) ? scale_colour(value / 255.0) : kEmpty);
     }
@@ -57,7 +63,8 @@ void draw_legend(Canvas& canvas) {
   for (int i = 0; i < 190; ++i) canvas.fill({bar.x + i * 2.0, bar.y, 2.5, bar.height}, scale_colour(i / 189.0));
   canvas.text({bar.x, bar.y + 32}, "0", 14);
   canvas.text({bar.x + bar.width, bar.y + 32}, "1", 14, Align::kRight);
-  canvas.text({bar.x + bar.width / 2, bar.y + 32}, "largest intensity in the cell", 14, Align::kCentre);
+  canvas.text({bar.x + bar.width / 2, bar.y + 32}, "intensity: of a point (left), largest of a cell (right)", 14,
+              Align::kCentre);
   canvas.fill({1360, bar.y, 18, 18}, kEmpty);
   canvas.text({1388, bar.y + 9}, "empty cell", 14);
   canvas.fill({1510, bar.y, 18, 18}, kGround);
@@ -70,7 +77,7 @@ Status draw_description(const std::filesystem::path& file, const PreparedScan& p
                         const std::string& title) {
   Canvas canvas(1730, 860);
   canvas.text({865, 20}, title, 16, Align::kCentre);
-  draw_from_above(canvas, prepared, parameters.descriptor);
+  draw_from_above(canvas, prepared, parameters);
   draw_descriptor(canvas, prepared.descriptor, parameters.descriptor);
   draw_legend(canvas);
   return canvas.save_png(file);

@@ -65,6 +65,9 @@ TEST(Parameters, ContradictionIsNamed) {
   p.preprocess.min_range_m = 20.0;
   p.preprocess.max_range_m = 10.0;
   EXPECT_NE(validate(p).error().message.find("preprocess.max_range_m"), std::string::npos);
+  p = {};
+  p.descriptor.max_range_m = 100.0;
+  EXPECT_NE(validate(p).error().message.find("up to preprocess.max_range_m = 80"), std::string::npos);
 }
 
 TEST(ParameterFile, ReadsBackWhatItWrites) {

@@ -25,6 +25,8 @@ Result<Parameters> read_parameters(const std::filesystem::path& file, Parameters
   try {
     document = toml::parse_file(file.string());
   } catch (const toml::parse_error& problem) {
+    if (std::error_code failure; !std::filesystem::is_regular_file(file, failure))
+      return Error{file.string() + ": no such file"};
     return Error{file.string() + ":" + std::to_string(problem.source().begin.line) + ": " +
                  std::string(problem.description())};
   }

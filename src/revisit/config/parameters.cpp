@@ -61,6 +61,7 @@ const std::vector<Entry>& table() {
       REVISIT_INTEGER(geometric, candidates, 1, 1000, "how many of the top-K candidates are registered, best first"),
       REVISIT_REAL(geometric, min_descriptor_score, 0, 2,
                    "candidates of lower geometry plus intensity score are not registered"),
+      REVISIT_SWITCH(geometric, features_first, "register from FPFH features before trying the yaw of the descriptors"),
       REVISIT_REAL(geometric, feature_radius_m, 0.1, 50, "neighbourhood of an FPFH feature"),
       REVISIT_REAL(geometric, inlier_distance_m, 0.01, 5, "farthest point-to-plane distance of an inlier"),
       REVISIT_REAL(geometric, min_inlier_ratio, 0, 1,
@@ -155,6 +156,7 @@ Result<Parameters> preset(std::string_view name) {
     p.temporal.frames = 5;
     p.temporal.min_score = 1.8;
     p.geometric.min_descriptor_score = 0.0;
+    p.geometric.features_first = true;
     return p;
   }
   std::string known;
@@ -204,6 +206,10 @@ Status validate(const Parameters& parameters) {
     return Error{
         "preprocess.min_range_m = " + to_text(parameters.preprocess.min_range_m) +
         " is not allowed; allowed: less than preprocess.max_range_m = " + to_text(parameters.preprocess.max_range_m)};
+  if (parameters.descriptor.max_range_m > parameters.preprocess.max_range_m)
+    return Error{
+        "descriptor.max_range_m = " + to_text(parameters.descriptor.max_range_m) +
+        " is not allowed; allowed: up to preprocess.max_range_m = " + to_text(parameters.preprocess.max_range_m)};
   return ok();
 }
 

@@ -53,6 +53,7 @@ struct GeometricOptions {
   double voxel_m = 1.0;               ///< edge of the voxels that thin a scan
   int candidates = 3;                 ///< how many of the top-K are registered, best first
   double min_descriptor_score = 1.0;  ///< candidates with a lower Phi_g + Phi_i are not registered
+  bool features_first = false;        ///< start from FPFH, as the paper does, before trying the descriptors' yaw
   double feature_radius_m = 3.0;      ///< neighbourhood of FPFH features
   double inlier_distance_m = 0.4;     ///< farthest point-to-plane distance of an inlier
   double min_inlier_ratio = 0.6;      ///< share of the points above ground, both ways, that must be inliers

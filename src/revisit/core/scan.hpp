@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include <revisit/core/ids.hpp>
@@ -27,9 +29,19 @@ struct Scan {
   std::size_t dropped_at_origin = 0;   ///< points left out by the reader: exactly (0,0,0), "no return"
 };
 
+/// Throws std::invalid_argument unless `rings` and `times_s` are empty or hold one entry a point.
+inline void require_consistent(const Scan& scan) {
+  const auto fits = [&](std::size_t size) { return size == 0 || size == scan.points.size(); };
+  if (!fits(scan.rings.size()) || !fits(scan.times_s.size()))
+    throw std::invalid_argument("a scan of " + std::to_string(scan.points.size()) + " points with " +
+                                std::to_string(scan.rings.size()) + " rings and " +
+                                std::to_string(scan.times_s.size()) + " times; allowed: none, or one a point");
+}
+
 /// Keeps the points whose index satisfies `keep`, with their rings and times, in their order.
 template <typename Predicate>
 void keep_points(Scan& scan, Predicate keep) {
+  require_consistent(scan);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     if (!keep(i)) continue;

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
+#include <vector>
 
 #include <revisit/io/internal/bytes.hpp>
 #include <revisit/io/internal/scan_formats.hpp>
@@ -45,6 +47,44 @@ bool is_plausible_point(const char* record) {
     if (!is_plausible(value) || (std::isfinite(value) && std::abs(value) > kLargestCoordinate)) return false;
   }
   return is_plausible(load<float>(record + 3 * sizeof(float)));
+}
+
+// How far neighbouring records of `floats` values lie apart in x, y and z, as a share of the whole spread: small where
+// the records are cut right, large where values of different meaning share a column.
+double roughness(const std::string& bytes, std::size_t floats) {
+  const std::size_t records = std::min<std::size_t>(bytes.size() / (floats * sizeof(float)), 20000);
+  if (records < 2) return 0.0;
+  double sum = 0.0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    double steps = 0.0, mean = 0.0, spread = 0.0;
+    std::vector<double> column;
+    for (std::size_t i = 0; i < records; ++i) {
+      const float value = load<float>(bytes.data() + (i * floats + axis) * sizeof(float));
+      if (std::isfinite(value)) column.push_back(std::clamp(static_cast<double>(value), -1e3, 1e3));
+    }
+    if (column.size() < 2) continue;
+    for (const double value : column) mean += value / static_cast<double>(column.size());
+    for (std::size_t i = 1; i < column.size(); ++i) steps += std::abs(column[i] - column[i - 1]);
+    for (const double value : column) spread += std::abs(value - mean);
+    sum += spread > 0.0 ? steps / spread : 0.0;
+  }
+  return sum;
+}
+
+// The number of floats a record, of those that divide the file, whose columns are smoothest; 4 unless another is
+// clearly smoother (points in random order are rough in any width).
+std::size_t likely_floats_per_record(const std::string& bytes) {
+  std::size_t best = 4;
+  double least = bytes.size() % kKittiBytes == 0 ? 0.7 * roughness(bytes, 4) : std::numeric_limits<double>::infinity();
+  for (const std::size_t floats : {3u, 5u, 6u, 7u, 8u}) {
+    if (bytes.size() % (floats * sizeof(float)) != 0) continue;
+    const double here = roughness(bytes, floats);
+    if (here < least) {
+      least = here;
+      best = floats;
+    }
+  }
+  return best;
 }
 
 bool is_nuscenes(const std::string& bytes) {
@@ -101,8 +141,13 @@ Result<Scan> read_bin(const std::filesystem::path& file) {
   const auto bytes = read_bytes(file);
   if (!bytes) return bytes.error();
   if (bytes->empty()) return Error{file.string() + ": empty file"};
-  if (is_nuscenes(*bytes)) return read_floats(*bytes, kNuscenesBytes);
-  if (is_kitti(*bytes)) return read_floats(*bytes, kKittiBytes);
+  const std::size_t floats = likely_floats_per_record(*bytes);
+  if (floats == 5 && is_nuscenes(*bytes)) return read_floats(*bytes, kNuscenesBytes);
+  if (is_kitti(*bytes)) {
+    if (floats == 4) return read_floats(*bytes, kKittiBytes);
+    return Error{file.string() + ": looks like records of " + std::to_string(floats) +
+                 " floats; allowed: 4 (x y z intensity) or 5 with a ring number"};
+  }
   if (is_nclt(*bytes)) return read_nclt(*bytes);
   const std::string size = std::to_string(bytes->size()) + " bytes";
   if (bytes->size() % kKittiBytes != 0)

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <cstring>
@@ -71,9 +72,12 @@ Result<std::vector<NumberRow>> read_number_rows(const std::filesystem::path& fil
     line = line.substr(0, line.find('#'));
     if (line.find_first_not_of(" \t\r") == std::string_view::npos) continue;
     auto values = parse_numbers(line);
-    if (!values)
-      return Error{file.string() + ":" + std::to_string(number) + ": '" + std::string(line.substr(0, 40)) +
-                   "' is not a row of numbers"};
+    if (!values) {
+      std::string excerpt(line.substr(0, 40));
+      std::replace_if(
+          excerpt.begin(), excerpt.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+      return Error{file.string() + ":" + std::to_string(number) + ": '" + excerpt + "' is not a row of numbers"};
+    }
     rows.push_back({number, std::move(*values)});
   }
   return rows;

@@ -74,7 +74,10 @@ Result<std::vector<double>> read_timestamps(const std::filesystem::path& file) {
     double second = 0.0;
     if (std::sscanf(std::string(line).c_str(), "%d-%u-%u %d:%d:%lf", &year, &month, &day, &hour, &minute, &second) != 6)
       return Error{file.string() + ": '" + std::string(line.substr(0, 40)) + "' is not 'YYYY-MM-DD hh:mm:ss.s'"};
-    const std::chrono::sys_days date = std::chrono::year(year) / std::chrono::month(month) / std::chrono::day(day);
+    const std::chrono::year_month_day ymd = std::chrono::year(year) / std::chrono::month(month) / std::chrono::day(day);
+    if (!ymd.ok() || hour < 0 || hour > 23 || minute < 0 || minute > 59 || !(second >= 0.0 && second < 61.0))
+      return Error{file.string() + ": '" + std::string(line.substr(0, 40)) + "' is no date and time"};
+    const std::chrono::sys_days date = ymd;
     times.push_back(static_cast<double>(date.time_since_epoch().count()) * 86400.0 + hour * 3600.0 + minute * 60.0 +
                     second);
   }

@@ -106,6 +106,22 @@ Result<PoseFile> from_g2o(const std::filesystem::path& file, const std::string& 
   return poses;
 }
 
+// Between two rows that are at most twice `max_gap_s` apart, interpolated; otherwise the nearer row within `max_gap_s`.
+std::optional<Pose> pose_at(const std::map<double, Pose>& by_time, double stamp_s, double max_gap_s) {
+  const auto after = by_time.lower_bound(stamp_s);
+  if (after != by_time.end() && after->first - stamp_s < 1e-6) return after->second;
+  const auto before = after == by_time.begin() ? by_time.end() : std::prev(after);
+  if (before != by_time.end() && after != by_time.end() && after->first - before->first <= 2.0 * max_gap_s) {
+    const double t = (stamp_s - before->first) / (after->first - before->first);
+    const Eigen::Quaterniond q(before->second.linear());
+    return orthonormal(q.slerp(t, Eigen::Quaterniond(after->second.linear())).toRotationMatrix(),
+                       (1.0 - t) * before->second.translation() + t * after->second.translation());
+  }
+  if (before != by_time.end() && stamp_s - before->first <= max_gap_s) return before->second;
+  if (after != by_time.end() && after->first - stamp_s <= max_gap_s) return after->second;
+  return std::nullopt;
+}
+
 void write_quaternion(TextWriter& writer, const Pose& T) {
   const Eigen::Quaterniond q(T.rotation());
   for (const double value : {T.translation().x(), T.translation().y(), T.translation().z(), q.x(), q.y(), q.z(), q.w()})
@@ -132,6 +148,10 @@ Result<PoseFile> read_poses(const std::filesystem::path& file) {
 
 Status write_kitti_poses(const std::filesystem::path& file, const Trajectory& trajectory,
                          const std::optional<Pose>& T_camera_lidar) {
+  constexpr std::int64_t kMostRows = 10'000'000;
+  if (!trajectory.empty() && trajectory.entries.rbegin()->first.value >= kMostRows)
+    return Error{file.string() + ": frame " + std::to_string(trajectory.entries.rbegin()->first.value) +
+                 " needs a row of its own number; allowed: below " + std::to_string(kMostRows)};
   TextWriter writer(file);
   writer.stream() << std::setprecision(10);
   std::int64_t next = 0;
@@ -174,16 +194,10 @@ Trajectory to_trajectory(const PoseFile& poses, const std::optional<Pose>& T_cam
   const Pose Tr = poses.format == PoseFormat::kKitti ? T_camera_lidar.value_or(Pose::Identity()) : Pose::Identity();
   const std::map<FrameId, double> stamp_of(stamps.begin(), stamps.end());
   if (poses.format == PoseFormat::kTum) {
-    std::vector<std::pair<double, const PoseRow*>> by_time;
-    for (const PoseRow& row : poses.rows) by_time.emplace_back(*row.stamp_s, &row);
-    std::sort(by_time.begin(), by_time.end());
+    std::map<double, Pose> by_time;
+    for (const PoseRow& row : poses.rows) by_time.emplace(*row.stamp_s, row.T_world_body);
     for (const auto& [frame, stamp_s] : stamps) {
-      auto nearest = std::lower_bound(by_time.begin(), by_time.end(), std::pair(stamp_s, (const PoseRow*)nullptr));
-      if (nearest == by_time.end() ||
-          (nearest != by_time.begin() && stamp_s - std::prev(nearest)->first < nearest->first - stamp_s))
-        --nearest;
-      if (std::abs(nearest->first - stamp_s) <= max_gap_s)
-        trajectory.entries[frame] = {stamp_s, nearest->second->T_world_body};
+      if (const auto T = pose_at(by_time, stamp_s, max_gap_s)) trajectory.entries[frame] = {stamp_s, *T};
     }
     return trajectory;
   }

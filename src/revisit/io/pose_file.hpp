@@ -37,8 +37,9 @@ Status write_kitti_poses(const std::filesystem::path& file, const Trajectory& tr
 Status write_tum_poses(const std::filesystem::path& file, const Trajectory& trajectory);
 Status write_g2o_poses(const std::filesystem::path& file, const Trajectory& trajectory);
 
-/// LiDAR poses by frame. KITTI poses of a camera become LiDAR poses through `T_camera_lidar`; TUM rows go to the frame
-/// of `stamps` that is nearest in time, at most `max_gap_s` away.
+/// LiDAR poses by frame. KITTI poses of a camera become LiDAR poses through `T_camera_lidar`; TUM poses are taken at
+/// the time of each frame of `stamps`: interpolated between rows at most twice `max_gap_s` apart, else the nearer row
+/// within `max_gap_s`.
 Trajectory to_trajectory(const PoseFile& poses, const std::optional<Pose>& T_camera_lidar,
                          const std::vector<std::pair<FrameId, double>>& stamps, double max_gap_s = 0.05);
 

@@ -58,9 +58,25 @@ TEST(PoseFile, EveryFormatReadsBackWhatWasWritten) {
   }
 }
 
+TEST(PoseFile, TumPosesAreInterpolatedBetweenNearRows) {
+  const fs::path file = fresh_folder() / "a.tum";
+  std::ofstream(file) << "99.98 0 0 0 0 0 0 1\n100.02 4 0 0 0 0 1 0\n100.5 9 0 0 0 0 0 1\n";
+  const Trajectory trajectory =
+      to_trajectory(*read_poses(file), std::nullopt, {{FrameId{0}, 100.01}, {FrameId{1}, 100.3}});
+  EXPECT_NEAR(trajectory.at(FrameId{0})->translation().x(), 3.0, 1e-6);
+  EXPECT_NEAR(to_degrees(rotation_angle(*trajectory.at(FrameId{0}))), 135.0, 1e-6);
+  EXPECT_FALSE(trajectory.at(FrameId{1}));
+}
+
+TEST(PoseFile, AFrameNumberThatWouldFillTheDiskIsRefused) {
+  Trajectory trajectory;
+  trajectory.entries[FrameId{999999999}] = {0.0, Pose::Identity()};
+  EXPECT_FALSE(write_kitti_poses(fresh_folder() / "poses.txt", trajectory, std::nullopt));
+}
+
 TEST(PoseFile, TumRowsGoToTheNearestFrameInTime) {
   const fs::path file = fresh_folder() / "a.tum";
-  std::ofstream(file) << "# time x y z q\n100.04 1 0 0 0 0 0 1\n100.11 2 0 0 0 0 0 1\n";
+  std::ofstream(file) << "# time x y z q\n100.04 1 0 0 0 0 0 1\n100.149 2 0 0 0 0 0 1\n";
   const auto poses = read_poses(file);
   ASSERT_TRUE(poses);
   const Trajectory trajectory = to_trajectory(*poses, std::nullopt, kStamps);

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <charconv>
+#include <iomanip>
 
 #include <revisit/io/internal/kitti_folder.hpp>
+#include <revisit/io/internal/text_writer.hpp>
 #include <revisit/io/pose_file.hpp>
 #include <revisit/io/scan_file.hpp>
 
@@ -44,10 +46,15 @@ class FolderRecording final : public Recording {
     return scan;
   }
 
-  std::vector<std::pair<FrameId, double>> stamps() const {
-    std::vector<std::pair<FrameId, double>> result;
-    for (const ScanFile& scan : scans_) result.emplace_back(scan.frame, scan.stamp_s);
-    return result;
+  // Poses of frames that the recording does not hold are left out.
+  void set_trajectory(const PoseFile& poses) {
+    std::vector<std::pair<FrameId, double>> stamps;
+    for (const ScanFile& scan : scans_) stamps.emplace_back(scan.frame, scan.stamp_s);
+    const Trajectory all = to_trajectory(poses, T_camera_lidar_, stamps);
+    trajectory_ = {};
+    for (const ScanFile& scan : scans_)
+      if (const auto found = all.entries.find(scan.frame); found != all.entries.end())
+        trajectory_.entries.insert(*found);
   }
 };
 
@@ -65,8 +72,23 @@ std::optional<std::int64_t> number_in_name(const fs::path& file) {
   return number;
 }
 
-// Frame numbers come from the names; where those do not tell the files apart, from their alphabetical order.
-Result<std::vector<ScanFile>> list_scans(const fs::path& folder) {
+// Whether something stands there. What cannot even be looked at (permissions, links in circles) counts as there:
+// reading it then gives the system's reason.
+bool is_present(const fs::path& path) {
+  std::error_code failure;
+  return fs::status(path, failure).type() != fs::file_type::not_found;
+}
+
+// Names of 13 digits and more are times since 1970 in milli-, micro- or nanoseconds (NCLT, ROS): seconds a unit.
+std::optional<double> unit_of_time_in_names(const std::map<FrameId, fs::path>& by_number) {
+  const double first = static_cast<double>(by_number.begin()->first.value);
+  for (const double unit_s : {1e-3, 1e-6, 1e-9})
+    if (first * unit_s > 3e8 && first * unit_s < 1e10) return unit_s;  // 1979 to 2286
+  return std::nullopt;
+}
+
+// Frame numbers come from the names; where those are times, or do not tell the files apart, from the order.
+Status list_scans(const fs::path& folder, FolderRecording& recording) {
   std::vector<fs::path> files;
   std::error_code failure;
   for (fs::directory_iterator it(folder, failure), end; !failure && it != end; it.increment(failure))
@@ -77,13 +99,20 @@ Result<std::vector<ScanFile>> list_scans(const fs::path& folder) {
   std::map<FrameId, fs::path> by_number;
   for (const fs::path& file : files)
     if (const auto number = number_in_name(file)) by_number.emplace(FrameId{*number}, file);
-  std::vector<ScanFile> scans;
-  if (by_number.size() == files.size()) {
-    for (const auto& [frame, file] : by_number) scans.push_back({frame, file});
+  auto& scans = recording.scans_;
+  if (by_number.size() != files.size()) {
+    for (const fs::path& file : files) scans.push_back({FrameId{static_cast<std::int64_t>(scans.size())}, file, 0.0});
+  } else if (const auto unit_s = unit_of_time_in_names(by_number)) {
+    for (const auto& [number, file] : by_number)
+      scans.push_back(
+          {FrameId{static_cast<std::int64_t>(scans.size())}, file, static_cast<double>(number.value) * *unit_s});
+    recording.has_times_ = true;
+    return ok();
   } else {
-    for (std::size_t i = 0; i < files.size(); ++i) scans.push_back({FrameId{static_cast<std::int64_t>(i)}, files[i]});
+    for (const auto& [frame, file] : by_number) scans.push_back({frame, file, 0.0});
   }
-  return scans;
+  for (ScanFile& scan : scans) scan.stamp_s = 0.1 * static_cast<double>(scan.frame.value);
+  return ok();
 }
 
 // Rows of times are counted by frame number.
@@ -101,19 +130,19 @@ Status set_stamps(FolderRecording& recording, const fs::path& file, const Result
 
 Status add_kitti_odometry(FolderRecording& recording, const fs::path& folder) {
   recording.kind_ = "KITTI odometry folder";
-  if (const auto file = folder / "times.txt"; fs::exists(file))
+  if (const auto file = folder / "times.txt"; is_present(file))
     if (const Status status = set_stamps(recording, file, io_internal::read_times(file)); !status) return status;
-  if (const auto file = folder / "calib.txt"; fs::exists(file)) {
+  if (const auto file = folder / "calib.txt"; is_present(file)) {
     const auto Tr = io_internal::read_kitti_calibration(file, "Tr");
     if (!Tr) return Tr.error();
     recording.T_camera_lidar_ = *Tr;
   }
   for (const char* name : {"poses.txt", "poses_subset.txt"}) {
     const fs::path file = folder / name;
-    if (!fs::exists(file)) continue;
+    if (!is_present(file)) continue;
     const auto poses = read_poses(file);
     if (!poses) return poses.error();
-    recording.trajectory_ = to_trajectory(*poses, recording.T_camera_lidar_, recording.stamps());
+    recording.set_trajectory(*poses);
     break;
   }
   return ok();
@@ -121,18 +150,22 @@ Status add_kitti_odometry(FolderRecording& recording, const fs::path& folder) {
 
 Status add_kitti_raw(FolderRecording& recording, const fs::path& folder) {
   recording.kind_ = "KITTI raw drive";
-  if (const auto file = folder / "velodyne_points" / "timestamps.txt"; fs::exists(file))
+  if (const auto file = folder / "velodyne_points" / "timestamps.txt"; is_present(file))
     if (const Status status = set_stamps(recording, file, io_internal::read_timestamps(file)); !status) return status;
-  if (!fs::exists(folder / "oxts" / "data")) return ok();
+  if (!is_present(folder / "oxts" / "data")) return ok();
   const auto imu_poses = io_internal::read_oxts(folder / "oxts");
   if (!imu_poses) return imu_poses.error();
   Pose T_lidar_imu = Pose::Identity();
-  if (const auto file = folder / "calib_imu_to_velo.txt"; fs::exists(file)) {
+  // KITTI keeps the calibration beside the drives of a day.
+  const fs::path beside = folder / "calib_imu_to_velo.txt", above = folder / ".." / "calib_imu_to_velo.txt";
+  if (const auto& file = is_present(beside) ? beside : above; is_present(file)) {
     const auto calibration = io_internal::read_kitti_raw_calibration(file);
     if (!calibration) return calibration.error();
     T_lidar_imu = *calibration;
   } else {
-    log_to(recording.log_, LogLevel::kWarning, file.string() + ": missing; the IMU's poses are used as the LiDAR's");
+    log_to(recording.log_, LogLevel::kWarning,
+           beside.string() + ": missing, and the IMU's poses are not the LiDAR's: they are left out");
+    return ok();
   }
   if (imu_poses->empty()) return ok();
   const Pose T_first_world = (imu_poses->begin()->second * T_lidar_imu.inverse()).inverse();
@@ -146,7 +179,8 @@ Status add_kitti_raw(FolderRecording& recording, const fs::path& folder) {
 
 }  // namespace
 
-Result<std::unique_ptr<Recording>> open_recording(const fs::path& folder, const LogSink& log) {
+Result<std::unique_ptr<Recording>> open_recording(const fs::path& folder, const LogSink& log,
+                                                  const fs::path& poses_file) {
   std::error_code failure;
   const fs::file_status status = fs::status(folder, failure);
   if (status.type() == fs::file_type::not_found) return Error{folder.string() + ": no such folder"};
@@ -155,22 +189,34 @@ Result<std::unique_ptr<Recording>> open_recording(const fs::path& folder, const 
 
   const fs::path raw = folder / "velodyne_points" / "data", odometry = folder / "velodyne";
   const bool is_raw = fs::is_directory(raw, failure), is_odometry = fs::is_directory(odometry, failure);
-  auto scans = list_scans(is_raw ? raw : is_odometry ? odometry : folder);
-  if (!scans) return scans.error();
-
   auto recording = std::make_unique<FolderRecording>();
-  recording->scans_ = std::move(*scans);
   recording->log_ = log;
   recording->kind_ = "folder of scans";
-  for (ScanFile& scan : recording->scans_) scan.stamp_s = 0.1 * static_cast<double>(scan.frame.value);
+  if (const Status listed = list_scans(is_raw ? raw : is_odometry ? odometry : folder, *recording); !listed)
+    return listed.error();
   if (const Status added = is_raw        ? add_kitti_raw(*recording, folder)
                            : is_odometry ? add_kitti_odometry(*recording, folder)
                                          : ok();
       !added)
     return added.error();
+  if (!poses_file.empty()) {
+    const auto poses = read_poses(poses_file);
+    if (!poses) return poses.error();
+    recording->set_trajectory(*poses);
+    if (recording->trajectory_.empty())
+      return Error{poses_file.string() + ": no pose belongs to a frame of " + folder.string()};
+  }
   return std::unique_ptr<Recording>(std::move(recording));
 }
 
 Result<Pose> read_camera_calibration(const fs::path& file) { return io_internal::read_kitti_calibration(file, "Tr"); }
+
+Status write_camera_calibration(const fs::path& file, const Pose& T_camera_lidar) {
+  io_internal::TextWriter writer(file);
+  writer.stream() << "Tr:" << std::setprecision(12);
+  for (int i = 0; i < 12; ++i) writer.stream() << ' ' << T_camera_lidar.matrix()(i / 4, i % 4);
+  writer.stream() << '\n';
+  return writer.finish();
+}
 
 }  // namespace revisit

@@ -35,10 +35,13 @@ class Recording {
 
 /// Opens a KITTI odometry folder (velodyne/, times.txt, calib.txt, poses.txt), a KITTI raw drive
 /// (velodyne_points/data/, oxts/), or a bare folder of .bin, .pcd or .ply scans. Poses, times and calibration that are
-/// there but broken are errors; scans are only looked at when they are read.
-Result<std::unique_ptr<Recording>> open_recording(const std::filesystem::path& folder, const LogSink& log = {});
+/// there but broken are errors; scans are only looked at when they are read. `poses_file` (KITTI, TUM or g2o) stands in
+/// for the poses that the folder has, if any.
+Result<std::unique_ptr<Recording>> open_recording(const std::filesystem::path& folder, const LogSink& log = {},
+                                                  const std::filesystem::path& poses_file = {});
 
 /// The calibration `Tr` in a KITTI calib.txt, LiDAR to camera.
 Result<Pose> read_camera_calibration(const std::filesystem::path& file);
+Status write_camera_calibration(const std::filesystem::path& file, const Pose& T_camera_lidar);
 
 }  // namespace revisit

@@ -35,6 +35,61 @@ TEST(Recording, BareFolderTakesFrameNumbersFromNames) {
   EXPECT_FLOAT_EQ(scan->points[0].x, 10.f);
 }
 
+TEST(Recording, NamesThatAreTimesGiveStampsAndFramesAreCounted) {
+  const fs::path folder = fresh_folder();
+  write_bin(folder / "1326030975726043.bin", 1.f);
+  write_bin(folder / "1326030975826043.bin", 2.f);
+  const auto recording = open_recording(folder);
+  ASSERT_TRUE(recording);
+  EXPECT_EQ((*recording)->frame(1).value, 1);
+  EXPECT_NEAR((*recording)->stamp_s(1) - (*recording)->stamp_s(0), 0.1, 1e-6);
+  EXPECT_NEAR((*recording)->stamp_s(0), 1326030975.726043, 1e-6);
+  EXPECT_TRUE((*recording)->has_times());
+}
+
+TEST(Recording, PosesMayComeFromAFileOfTheirOwn) {
+  const fs::path folder = fresh_folder();
+  write_bin(folder / "3.bin", 1.f);
+  write_bin(folder / "4.bin", 2.f);
+  const fs::path poses = folder / "poses.g2o";
+  std::ofstream(poses) << "VERTEX_SE3:QUAT 4 1 2 3 0 0 0 1\nVERTEX_SE3:QUAT 99 0 0 0 0 0 0 1\n";
+  const auto recording = open_recording(folder, {}, poses);
+  ASSERT_TRUE(recording) << recording.error().message;
+  EXPECT_EQ((*recording)->trajectory().entries.size(), 1u) << "frame 99 is not in the recording";
+  EXPECT_DOUBLE_EQ((*recording)->trajectory().at(FrameId{4})->translation().y(), 2.0);
+  std::ofstream(poses) << "VERTEX_SE3:QUAT 99 0 0 0 0 0 0 1\n";
+  EXPECT_NE(open_recording(folder, {}, poses).error().message.find("no pose belongs"), std::string::npos);
+}
+
+TEST(Recording, KittiRawTimesAndCalibration) {
+  const fs::path day = fresh_folder(), folder = day / "drive";
+  fs::create_directories(folder / "velodyne_points" / "data");
+  fs::create_directories(folder / "oxts" / "data");
+  write_bin(folder / "velodyne_points" / "data" / "0000000000.bin", 1.f);
+  std::ofstream(folder / "oxts" / "data" / "0000000000.txt") << "49 8 110 0 0 0\n";
+  const fs::path times = folder / "velodyne_points" / "timestamps.txt";
+  for (const char* bad : {"2011-99-99 99:99:nan\n", "2011-09-26 25:00:00.0\n", "yesterday\n"}) {
+    std::ofstream(times, std::ios::trunc) << bad;
+    EXPECT_FALSE(open_recording(folder)) << bad;
+  }
+  std::ofstream(times, std::ios::trunc) << "2011-09-26 13:04:32.5\n";
+  std::string warning;
+  const auto without = open_recording(folder, [&](LogLevel, const std::string& message) { warning = message; });
+  ASSERT_TRUE(without) << without.error().message;
+  EXPECT_TRUE((*without)->trajectory().empty()) << "poses of the IMU are not the LiDAR's";
+  EXPECT_NE(warning.find("calib_imu_to_velo.txt: missing"), std::string::npos);
+  std::ofstream(day / "calib_imu_to_velo.txt") << "R: 1 0 0 0 1 0 0 0 1\nT: 0 0 0\n";
+  EXPECT_EQ((*open_recording(folder))->trajectory().entries.size(), 1u) << "KITTI keeps it beside the drives";
+}
+
+TEST(Recording, WhatCannotBeLookedAtIsAnErrorNotAnException) {
+  const fs::path folder = fresh_folder();
+  fs::create_directories(folder / "velodyne");
+  write_bin(folder / "velodyne" / "000000.bin", 1.f);
+  fs::create_symlink("times.txt", folder / "times.txt");
+  EXPECT_NE(open_recording(folder).error().message.find("times.txt"), std::string::npos);
+}
+
 TEST(Recording, NamesWithoutNumbersAreTakenInAlphabeticalOrder) {
   const fs::path folder = fresh_folder();
   write_bin(folder / "kitchen.bin", 1.f);

@@ -51,7 +51,11 @@ TEST(ResultFiles, ExistingResultsAreKept) {
   const auto second = ResultWriter::create(folder, false);
   ASSERT_FALSE(second);
   EXPECT_NE(second.error().message.find("--overwrite"), std::string::npos);
+  std::ofstream(folder / "poses.txt") << "of an earlier run";
+  std::ofstream(folder / "notes.txt") << "of the user";
   EXPECT_TRUE(ResultWriter::create(folder, true));
+  EXPECT_FALSE(fs::exists(folder / "poses.txt"));
+  EXPECT_TRUE(fs::exists(folder / "notes.txt"));
 }
 
 TEST(ResultFiles, AFullDiskIsNoticed) {

@@ -64,12 +64,53 @@ TEST(ReadBin, CoordinatesThatAreZeroButForRoundingAreNoReasonToDoubt) {
 TEST(ReadBin, FiveFloatsWithRings) {
   std::string bytes;
   for (int i = 0; i < 64; ++i)
-    for (const float value : {3.f, 4.f, 0.5f, 17.f, static_cast<float>(i % 32)}) append(bytes, value);
+    for (const float value : {3.f + 0.1f * static_cast<float>(i / 32), 4.f, 0.5f + 0.01f * static_cast<float>(i % 32),
+                              17.f, static_cast<float>(i % 32)})
+      append(bytes, value);
   const auto scan = read_scan(write_file("a.pcd.bin", bytes));
   ASSERT_TRUE(scan) << scan.error().message;
   ASSERT_EQ(scan->rings.size(), 64u);
   EXPECT_EQ(scan->rings[33], 1);
   EXPECT_FLOAT_EQ(scan->points[33].y, 4.f);
+}
+
+// A scan as a sensor writes it, ring after ring, with `floats` values a point.
+std::string records(int floats) {
+  std::string bytes;
+  for (int i = 0; i < 4000; ++i) {
+    const float angle = 0.0063f * static_cast<float>(i % 1000), range = 10.f + 3.f * std::sin(3.f * angle);
+    const float values[6] = {range * std::cos(angle),
+                             range * std::sin(angle),
+                             -1.f + 0.5f * static_cast<float>(i / 1000),
+                             0.3f + 0.1f * std::sin(40.f * angle),
+                             0.0001f * static_cast<float>(i) + 0.05f,
+                             1.f};
+    for (int k = 0; k < floats; ++k) append(bytes, values[k]);
+  }
+  return bytes;
+}
+
+TEST(ReadBin, RecordsOfAnotherWidthAreNotReadAsRubbish) {
+  EXPECT_TRUE(read_scan(write_file("4.bin", records(4))));
+  for (const int floats : {3, 5, 6}) {
+    const auto scan = read_scan(write_file("wide.bin", records(floats)));
+    ASSERT_FALSE(scan) << floats;
+    EXPECT_NE(scan.error().message.find("looks like records of " + std::to_string(floats) + " floats"),
+              std::string::npos)
+        << scan.error().message;
+  }
+}
+
+TEST(ReadBin, PointsAllAlikeAreStillFourFloats) {
+  for (const float step : {0.f, 0.01f}) {
+    std::string bytes;
+    for (int i = 0; i < 1000; ++i)
+      for (const float value : {10.f + step * static_cast<float>(i % 3), 0.f, 0.f, 0.f}) append(bytes, value);
+    const auto scan = read_scan(write_file("a.bin", bytes));
+    ASSERT_TRUE(scan) << scan.error().message;
+    EXPECT_EQ(scan->points.size(), 1000u);
+    EXPECT_TRUE(scan->rings.empty());
+  }
 }
 
 TEST(ReadBin, BrokenFilesAreRefusedWithTheirName) {
@@ -145,6 +186,19 @@ TEST(ReadPcd, LyingHeadersAreRefused) {
     const auto scan = read_scan(write_file("a.pcd", header + body));
     EXPECT_FALSE(scan) << header;
   }
+}
+
+TEST(ReadPcd, AsciiRowsThatAreNoPointsAreNamed) {
+  const std::string header = pcd("x y z intensity", "4 4 4 4", "F F F F", "1 1 1 1", 3, "ascii");
+  for (const char* rows : {"1 2 3 4\nabc 2 3 4\n5 6 7 8\n", "1 2 3 4\n1 2\n5 6 7 8\n", "1 2 3 4\n1 2 3 4 5\n5 6 7 8\n",
+                           "1 2 3 4\n5 5 5 hello\n5 6 7 8\n"}) {
+    const auto scan = read_scan(write_file("a.pcd", header + rows));
+    ASSERT_FALSE(scan) << rows;
+    EXPECT_NE(scan.error().message.find("point 2: "), std::string::npos) << scan.error().message;
+  }
+  // 2000 points of 100,000 values each do not fit in a few bytes.
+  EXPECT_FALSE(
+      read_scan(write_file("b.pcd", pcd("x y z w", "4 4 4 8", "F F F F", "1 1 1 100000", 2000, "ascii") + "1 2 3\n")));
 }
 
 TEST(ReadPly, AsciiAndLies) {

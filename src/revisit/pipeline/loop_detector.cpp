@@ -57,6 +57,11 @@ Result<PreparedScan> LoopDetector::prepare(Scan scan) {
   auto prepared = prepare_scan(std::move(scan), parameters_, *scale_, calibration_);
   if (prepared && !rings_were_reported_) {
     rings_were_reported_ = true;
+    const std::size_t known = calibration_.ring_gains.size(), seen = prepared->ground.ring_count;
+    if (known != 0 && known != seen)
+      log_to(log_, LogLevel::kWarning,
+             "the intensity calibration knows " + std::to_string(known) + " laser rings, the scans show " +
+                 std::to_string(seen) + ": its ring gains are left out (was it made with another sensor?)");
     log_to(log_, prepared->ground.rings == RingSource::kNone ? LogLevel::kWarning : LogLevel::kInfo,
            prepared->ground.rings == RingSource::kNone
                ? "no laser rings found: ground is segmented on a polar grid instead of the range image"

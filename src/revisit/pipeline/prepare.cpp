@@ -34,6 +34,7 @@ double Stopwatch::lap_ms() {
 
 Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const IntensityScale& scale,
                                   const IntensityCalibration& calibration) {
+  require_consistent(scan);
   PreparedScan prepared;
   prepared.scan = std::move(scan);
   Stopwatch watch;
@@ -72,12 +73,17 @@ Result<IntensityScale> estimate_intensity_scale(const Recording& recording, cons
   std::vector<Scan> sample;
   std::optional<Error> first_error;
   const std::size_t count = std::min(kSamples, recording.size());
+  // The first readable scan of each tenth of the recording: broken ones must not decide.
   for (std::size_t i = 0; i < count; ++i) {
-    auto scan = recording.read(i * recording.size() / count);
-    if (scan)
-      sample.push_back(*std::move(scan));
-    else if (!first_error)
-      first_error = scan.error();
+    const std::size_t begin = i * recording.size() / count, end = (i + 1) * recording.size() / count;
+    for (std::size_t index = begin; index < end; ++index) {
+      auto scan = recording.read(index);
+      if (scan) {
+        sample.push_back(*std::move(scan));
+        break;
+      }
+      if (!first_error) first_error = scan.error();
+    }
   }
   if (sample.empty()) return first_error.value_or(Error{"the recording holds no scan"});
   return estimate_intensity_scale(std::span<const Scan>(sample), parameters.intensity);

@@ -20,7 +20,10 @@ constexpr std::array kKnots_m = {2.0, 4.0, 6.0, 8.0, 10.0, 13.0, 16.0, 20.0, 25.
 
 std::uint64_t patch_key(const Eigen::Vector3d& p) {
   constexpr std::int64_t kOffset = 1 << 20;
-  const auto index = [](double metres) { return static_cast<std::uint64_t>(std::floor(metres / kPatch_m) + kOffset); };
+  const auto index = [](double metres) {
+    const auto cell = static_cast<std::int64_t>(std::floor(metres / kPatch_m)) + kOffset;
+    return static_cast<std::uint64_t>(std::clamp<std::int64_t>(cell, 0, 2 * kOffset - 1));
+  };
   return index(p.x()) << 42 | index(p.y()) << 21 | index(p.z());
 }
 
@@ -67,6 +70,7 @@ double disagreement(const Groups& groups, Intensity intensity) {
 
 void CalibrationLearner::add(const Scan& scan, const std::vector<std::uint16_t>& rings, const Pose& T_world_lidar) {
   if (frames_++ >= kMostFrames) return;
+  if (frames_ == 1) origin_ = T_world_lidar.translation();  // maps count from far away; patches from here
   // One observation a patch and ring: the mean of its points, so that dense near patches do not outvote the rest.
   struct Sample {
     std::uint64_t patch;
@@ -80,7 +84,7 @@ void CalibrationLearner::add(const Scan& scan, const std::vector<std::uint16_t>&
     const Eigen::Vector3d at(p.x, p.y, p.z);
     const std::uint16_t ring = rings.empty() ? std::uint16_t{0} : rings[i];
     ring_count_ = std::max<std::size_t>(ring_count_, rings.empty() ? 0 : ring + 1u);
-    samples.push_back({patch_key(T_world_lidar * at), ring, p.intensity, static_cast<float>(at.norm())});
+    samples.push_back({patch_key(T_world_lidar * at - origin_), ring, p.intensity, static_cast<float>(at.norm())});
   }
   std::stable_sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) {
     return a.patch != b.patch ? a.patch < b.patch : a.ring < b.ring;

@@ -40,6 +40,7 @@ class CalibrationLearner {
   };
   std::vector<Observation> observations_;
   std::size_t frames_ = 0, ring_count_ = 0;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
 };
 
 }  // namespace revisit

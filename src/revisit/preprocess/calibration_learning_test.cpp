@@ -15,7 +15,9 @@ using testing_support::SyntheticWorld;
 double true_gain(double distance_m) { return 0.35 + 0.65 * std::exp(-distance_m / 15.0); }
 double true_ring_gain(int ring) { return ring % 2 == 0 ? 0.8 : 1.0; }
 
-TEST(CalibrationLearner, FindsTheGainsOfASimulatedSensor) {
+class CalibrationLearnerFarFromTheOrigin : public testing::TestWithParam<double> {};
+
+TEST_P(CalibrationLearnerFarFromTheOrigin, FindsTheGainsOfASimulatedSensor) {
   const SyntheticWorld world(11);
   CalibrationLearner learner;
   SyntheticWorld::Sensor sensor{32, 900, -24.8, 2.0};
@@ -27,7 +29,9 @@ TEST(CalibrationLearner, FindsTheGainsOfASimulatedSensor) {
       Point& p = scan.points[k];
       p.intensity *= static_cast<float>(true_gain(std::hypot(p.x, p.y, p.z)) * true_ring_gain(scan.rings[k]));
     }
-    learner.add(scan, scan.rings, T);
+    Pose T_map_lidar = T;  // maps may count from hundreds of kilometres away
+    T_map_lidar.translation() += Eigen::Vector3d(GetParam(), 10.0 * GetParam(), 0.0);
+    learner.add(scan, scan.rings, T_map_lidar);
   }
   const auto report = learner.solve();
   ASSERT_TRUE(report) << report.error().message;
@@ -39,6 +43,9 @@ TEST(CalibrationLearner, FindsTheGainsOfASimulatedSensor) {
     EXPECT_NEAR(phi.distance_gain(d) * true_gain(d) / factor, 1.0, 0.12) << d << " m";
   EXPECT_NEAR(phi.ring_gain(20) / phi.ring_gain(21), 1.0 / 0.8, 0.08);
 }
+
+INSTANTIATE_TEST_SUITE_P(Offsets, CalibrationLearnerFarFromTheOrigin, testing::Values(0.0, 400000.0),
+                         [](const auto& each) { return each.param == 0.0 ? "none" : "UTM"; });
 
 TEST(CalibrationLearner, AStandingSensorTeachesNothing) {
   const SyntheticWorld world(11);

@@ -8,9 +8,10 @@
 namespace revisit {
 namespace {
 
-// ring + time / 1000 and the like from odometry front ends: nearly every reading is different. Sensors quantise:
-// even 16-bit reflectance repeats its values within a scan.
-constexpr double kShareOfDistinctReadings = 0.5;
+// Odometry front ends store ring + time in the field: whole parts of few values, fractions no longer than a sweep, and
+// nearly every reading different. Reflectance repeats itself, or is spread over the whole range between whole numbers.
+constexpr double kShareOfDistinctReadings = 0.5, kShareOfSweepFractions = 0.98;
+constexpr float kLongestSweep_s = 0.25f, kMostRings = 256.f;
 constexpr std::size_t kFewestReadings = 1000;  // below that, nothing can be said about repetition
 
 double quantile(std::vector<float>& values, double share) {
@@ -19,12 +20,24 @@ double quantile(std::vector<float>& values, double share) {
   return static_cast<double>(values[rank]);
 }
 
-double share_of_distinct(const Scan& scan) {
+bool looks_like_ring_and_time(const Scan& scan) {
+  if (scan.points.size() < kFewestReadings) return false;
   std::vector<float> readings;
-  for (const Point& p : scan.points) readings.push_back(p.intensity);
+  std::size_t sweep_fractions = 0;
+  for (const Point& p : scan.points) {
+    readings.push_back(p.intensity);
+    sweep_fractions += p.intensity - std::floor(p.intensity) <= kLongestSweep_s;
+  }
   std::sort(readings.begin(), readings.end());
+  const auto points = static_cast<double>(readings.size());
   const auto distinct = std::unique(readings.begin(), readings.end()) - readings.begin();
-  return static_cast<double>(distinct) / static_cast<double>(scan.points.size());
+  return static_cast<double>(distinct) > kShareOfDistinctReadings * points &&
+         static_cast<double>(sweep_fractions) > kShareOfSweepFractions * points && scan.points.size() > 0 &&
+         readings.front() >= 0.f &&
+         *std::max_element(
+             readings.begin(),
+             readings.begin() +
+                 distinct)<kMostRings&& * std::max_element(readings.begin(), readings.begin() + distinct)> 2.f;
 }
 
 }  // namespace
@@ -34,7 +47,7 @@ IntensityScale estimate_intensity_scale(std::span<const Scan> sample, const Inte
   std::vector<float> positive;
   std::size_t readings = 0;
   bool first = true;
-  double distinct = 0.0;
+  bool ring_and_time = false;
   for (const Scan& scan : sample) {
     readings += scan.points.size();
     for (const Point& p : scan.points) {
@@ -44,7 +57,7 @@ IntensityScale estimate_intensity_scale(std::span<const Scan> sample, const Inte
       first = false;
       if (p.intensity > 0.f) positive.push_back(p.intensity);
     }
-    if (scan.points.size() >= kFewestReadings) distinct = std::max(distinct, share_of_distinct(scan));
+    ring_and_time = ring_and_time || looks_like_ring_and_time(scan);
   }
   if (!positive.empty()) {
     scale.median_raw = quantile(positive, 0.5);
@@ -54,15 +67,18 @@ IntensityScale estimate_intensity_scale(std::span<const Scan> sample, const Inte
   if (readings > 0 && positive.empty()) {
     scale.is_reflectance = false;
     scale.warning = "the intensity field holds no positive value: places are told apart by geometry alone";
-  } else if (readings >= kFewestReadings && scale.min_raw == scale.max_raw) {
+  } else if (readings > 1 && scale.min_raw == scale.max_raw) {
     scale.is_reflectance = false;
     scale.warning =
         "all intensities are equal (" + std::to_string(scale.min_raw) + "): places are told apart by geometry alone";
-  } else if (distinct > kShareOfDistinctReadings) {
+  } else if (ring_and_time) {
     scale.is_reflectance = false;
     scale.warning =
-        "the intensity field is no reflectance: " + std::to_string(static_cast<int>(std::lround(100.0 * distinct))) +
-        " % of its readings are different, as where an odometry front end stores ring + time in it";
+        "the intensity field is no reflectance: it holds ring + time, as an odometry front end writes it; places are "
+        "told apart by geometry alone";
+  } else if (readings >= kFewestReadings && scale.median_raw >= scale.full_scale) {
+    scale.warning = "half of the intensities stand at the upper end (" + std::to_string(scale.full_scale) +
+                    "): they tell little about places";
   }
   return scale;
 }

@@ -16,7 +16,7 @@ struct IntensityScale {
   double full_scale = 1.0;                                ///< the reading that becomes 1; larger ones are cut to 1
   double min_raw = 0.0, median_raw = 0.0, max_raw = 0.0;  ///< over the sample
   bool is_reflectance = true;                             ///< false: the field plainly holds something else, or nothing
-  std::string warning;                                    ///< empty, or why is_reflectance is false
+  std::string warning;                                    ///< empty, or what is wrong with the field
 };
 
 /// Decides the scale from a sample of a recording's scans, once for all of them: a quantile of the positive readings,

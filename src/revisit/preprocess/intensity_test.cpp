@@ -61,9 +61,28 @@ TEST(IntensityScale, FieldsThatAreNoReflectanceAreNamed) {
   EXPECT_NE(scale_of(equal).warning.find("equal"), std::string::npos);
   EXPECT_NE(scale_of(zero).warning.find("no positive value"), std::string::npos);
   EXPECT_EQ(scale_of(readings(1.0, 1.0)).warning, "");
+  equal.points.resize(20);
+  EXPECT_FALSE(scale_of(equal).is_reflectance) << "also of few points";
   // Such a field says only that there was a return.
   normalise_intensity(equal, scale_of(equal));
   EXPECT_EQ(equal.points[0].intensity, 1.f);
+}
+
+TEST(IntensityScale, UnquantisedReflectanceIsReflectance) {
+  std::mt19937 random(3);
+  for (const float top : {1.f, 10.f, 255.f, 4000.f}) {
+    std::uniform_real_distribution<float> reading(0.f, top);
+    Scan scan = readings(1.0, 1.0);
+    for (Point& p : scan.points) p.intensity = reading(random);
+    EXPECT_TRUE(scale_of(scan).is_reflectance) << top;
+  }
+}
+
+TEST(IntensityScale, SaturatedReadingsAreToldButUsed) {
+  Scan scan = readings(1.0, 1.0);
+  for (std::size_t i = 0; i < scan.points.size(); ++i) scan.points[i].intensity = i % 3 == 0 ? 100.f : 255.f;
+  EXPECT_TRUE(scale_of(scan).is_reflectance);
+  EXPECT_NE(scale_of(scan).warning.find("upper end"), std::string::npos);
 }
 
 TEST(IntensityScale, NothingToLookAt) {

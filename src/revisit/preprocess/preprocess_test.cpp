@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <stdexcept>
+
 #include <gtest/gtest.h>
 
 #include <revisit/preprocess/range_filter.hpp>
@@ -24,6 +26,14 @@ TEST(FilterRange, KeepsWhatLiesBetweenInOrder) {
   EXPECT_EQ(scan.points[0].x, 2.f);
   EXPECT_EQ(scan.rings, (std::vector<std::uint16_t>{20, 50, 100}));
   EXPECT_EQ(scan.times_s.back(), 0.1f);
+}
+
+TEST(FilterRange, RingsOfAnotherNumberThrow) {
+  Scan scan;
+  scan.points.resize(100);
+  scan.rings.resize(10);
+  EXPECT_THROW(filter_range(scan, {}), std::invalid_argument);
+  EXPECT_THROW(keep_points(scan, [](std::size_t) { return true; }), std::invalid_argument);
 }
 
 TEST(FilterRange, EmptyStaysEmpty) {

@@ -4,6 +4,7 @@
 namespace revisit {
 
 void filter_range(Scan& scan, const PreprocessOptions& options) {
+  require_consistent(scan);
   const float min2 = static_cast<float>(options.min_range_m * options.min_range_m);
   const float max2 = static_cast<float>(options.max_range_m * options.max_range_m);
   // Written always, advanced only where kept: no branch for the processor to guess.

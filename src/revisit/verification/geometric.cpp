@@ -2,6 +2,7 @@
 #include <revisit/verification/geometric.hpp>
 
 #include <cstdio>
+#include <optional>
 
 #include <revisit/registration/feature_alignment.hpp>
 #include <revisit/registration/icp.hpp>
@@ -44,21 +45,29 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
 
 GeometricEvidence check_geometric(ScanGeometry& match, ScanGeometry& query, double yaw_rad,
                                   const GeometricOptions& options) {
-  Pose T_yaw = Pose::Identity();
-  T_yaw.linear() = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  GeometricEvidence best = register_from(match.surface(), query.surface(), T_yaw, options);
-  if (best.consistent) return best;
-  const auto features = align_features(match.surface(), match.features(options.feature_radius_m), query.surface(),
-                                       query.features(options.feature_radius_m));
-  if (!features) return best;
-  GeometricEvidence second = register_from(match.surface(), query.surface(), features->T_target_source, options);
-  if (second.consistent || second.inlier_ratio > best.inlier_ratio) {
-    best = second;
-    best.from_features = true;
+  std::optional<GeometricEvidence> best;
+  const auto consider = [&](GeometricEvidence evidence, const std::optional<FeatureAlignment>& features) {
+    evidence.from_features = features.has_value();
+    const std::size_t matches = features ? features->matches : best ? best->feature_matches : 0;
+    const std::size_t inliers = features ? features->inliers : best ? best->feature_inliers : 0;
+    if (!best || evidence.consistent || evidence.inlier_ratio > best->inlier_ratio) best = evidence;
+    best->feature_matches = matches;
+    best->feature_inliers = inliers;
+  };
+  for (const bool from_features : {options.features_first, !options.features_first}) {
+    if (from_features) {
+      const auto features = align_features(match.surface(), match.features(options.feature_radius_m), query.surface(),
+                                           query.features(options.feature_radius_m));
+      if (!features) continue;
+      consider(register_from(match.surface(), query.surface(), features->T_target_source, options), features);
+    } else {
+      Pose T_yaw = Pose::Identity();
+      T_yaw.linear() = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+      consider(register_from(match.surface(), query.surface(), T_yaw, options), std::nullopt);
+    }
+    if (best->consistent) break;
   }
-  best.feature_matches = features->matches;
-  best.feature_inliers = features->inliers;
-  return best;
+  return *best;
 }
 
 }  // namespace revisit

@@ -39,6 +39,16 @@ TEST(GeometricConsistency, FeaturesSaveAWrongYaw) {
   EXPECT_LT(error.translation().norm(), 0.1);
 }
 
+TEST(GeometricConsistency, ThePapersOrderStartsFromFeatures) {
+  const Pose T_match = SyntheticWorld::at(0, 0, 0), T_query = SyntheticWorld::at(2, 1, to_radians(100.0));
+  ScanGeometry match = scan_at(31, T_match), query = scan_at(31, T_query);
+  GeometricOptions options;
+  options.features_first = true;
+  const GeometricEvidence evidence = check_geometric(match, query, to_radians(100.0), options);
+  ASSERT_TRUE(evidence.consistent) << evidence.reason;
+  EXPECT_TRUE(evidence.from_features) << "though the yaw was right";
+}
+
 TEST(GeometricConsistency, AnotherPlaceIsRefused) {
   for (const unsigned other : {32u, 33u, 34u}) {
     ScanGeometry match = scan_at(31, SyntheticWorld::at(0, 0, 0)), query = scan_at(other, SyntheticWorld::at(0, 0, 0));
