@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <ostream>
 #include <random>
 #include <vector>
 
@@ -33,6 +34,8 @@ class SyntheticWorld {
     double lowest_deg = -24.8, highest_deg = 2.0, height_m = 1.73, max_range_m = 80.0, noise_m = 0.01;
     bool with_rings = false;
   };
+
+  friend void PrintTo(const Sensor& sensor, std::ostream* out) { *out << sensor.rings << " lines"; }
 
   /// A scan from T_world_lidar (z of the ground is 0), points ring after ring from straight ahead, as KITTI stores
   /// them.

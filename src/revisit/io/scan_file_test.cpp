@@ -224,6 +224,8 @@ struct Expectation {
   float max_intensity;
 };
 
+void PrintTo(const Expectation& expectation, std::ostream* out) { *out << expectation.file; }
+
 class RealFormats : public testing::TestWithParam<Expectation> {};
 
 TEST_P(RealFormats, ReadRightOrRefusedWithAReason) {

@@ -18,6 +18,8 @@ struct RingCase {
   double lowest_deg, highest_deg;
 };
 
+void PrintTo(const RingCase& sensor, std::ostream* out) { *out << sensor.rings << " lines"; }
+
 class RecoveredRings : public testing::TestWithParam<RingCase> {};
 
 TEST_P(RecoveredRings, EqualTheTrueOnesWhateverTheOrder) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -15,15 +16,34 @@ struct Match {
   Eigen::Vector3d target, source;
 };
 
-// For each column of `a` the column of `b` that is nearest.
-std::vector<Eigen::Index> nearest_columns(const Eigen::MatrixXf& a, const Eigen::MatrixXf& b) {
-  std::vector<Eigen::Index> nearest(static_cast<std::size_t>(a.cols()));
-  const Eigen::VectorXf b_norms = b.colwise().squaredNorm();
-  constexpr Eigen::Index kBlock = 256;  // keeps the table of distances in the cache
+// For each column of `a` the nearest of `b`, and the other way round, from one table of distances.
+struct NearestColumns {
+  std::vector<Eigen::Index> of_a, of_b;
+};
+
+NearestColumns nearest_columns(const Eigen::MatrixXf& a, const Eigen::MatrixXf& b) {
+  NearestColumns nearest;
+  nearest.of_a.resize(static_cast<std::size_t>(a.cols()));
+  nearest.of_b.resize(static_cast<std::size_t>(b.cols()), 0);
+  const Eigen::VectorXf a_norms = a.colwise().squaredNorm(), b_norms = b.colwise().squaredNorm();
+  Eigen::VectorXf least_of_b = Eigen::VectorXf::Constant(b.cols(), std::numeric_limits<float>::infinity());
+  constexpr Eigen::Index kBlock = 256;  // keeps the table in the cache
+  Eigen::MatrixXf distances;
   for (Eigen::Index begin = 0; begin < a.cols(); begin += kBlock) {
     const Eigen::Index count = std::min(kBlock, a.cols() - begin);
-    const Eigen::MatrixXf distances = (-2.f * (b.transpose() * a.middleCols(begin, count))).colwise() + b_norms;
-    for (Eigen::Index i = 0; i < count; ++i) distances.col(i).minCoeff(&nearest[static_cast<std::size_t>(begin + i)]);
+    distances.noalias() = -2.f * (b.transpose() * a.middleCols(begin, count));
+    distances.colwise() += b_norms;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      distances.col(i).minCoeff(&nearest.of_a[static_cast<std::size_t>(begin + i)]);
+      const float a_norm = a_norms(begin + i);
+      for (Eigen::Index j = 0; j < b.cols(); ++j) {
+        const float distance = distances(j, i) + a_norm;
+        if (distance < least_of_b(j)) {
+          least_of_b(j) = distance;
+          nearest.of_b[static_cast<std::size_t>(j)] = begin + i;
+        }
+      }
+    }
   }
   return nearest;
 }
@@ -32,10 +52,10 @@ std::vector<Match> mutual_matches(const SurfaceCloud& target, const Features& t,
                                   const Features& s) {
   std::vector<Match> matches;
   if (t.points.empty() || s.points.empty()) return matches;
-  const auto to_target = nearest_columns(s.values, t.values), to_source = nearest_columns(t.values, s.values);
+  const NearestColumns nearest = nearest_columns(s.values, t.values);
   for (std::size_t i = 0; i < s.points.size(); ++i) {
-    const auto j = static_cast<std::size_t>(to_target[i]);
-    if (to_source[j] != static_cast<Eigen::Index>(i)) continue;
+    const auto j = static_cast<std::size_t>(nearest.of_a[i]);
+    if (nearest.of_b[j] != static_cast<Eigen::Index>(i)) continue;
     matches.push_back({target.point(t.points[j]).cast<double>(), source.point(s.points[i]).cast<double>()});
   }
   return matches;
