@@ -15,7 +15,7 @@ build/revisit detect "$recording" --out "$out" --overwrite
 query=$(awk -F, 'NR > 1 { print $1; exit }' "$out/loops.csv")
 if [ -n "$query" ]; then
   for scan in "$recording"/velodyne/*"$(printf '%06d' "$query")".bin; do
-    if [ -f "$scan" ]; then build/revisit describe "$scan" "$out/scan.png"; fi
+    if [ -f "$scan" ]; then build/revisit describe "$scan" --out "$out/scan.png"; fi
   done
 fi
 echo
