@@ -307,6 +307,9 @@ TEST(Cli, CalibrateLearnsAndDetectApplies) {
   const Outcome learn = run("calibrate " + recording.string() + " --out " + phi.string());
   ASSERT_EQ(learn.code, 0) << learn.output;
   EXPECT_NE(learn.output.find("disagreement"), std::string::npos);
+  std::ofstream(folder / "notes.txt") << "precious";
+  EXPECT_EQ(run("calibrate " + recording.string() + " --out " + (folder / "notes.txt").string()).code, 2);
+  EXPECT_EQ(content(folder / "notes.txt"), "precious");
   const Outcome apply =
       run("detect " + recording.string() + " --out " + (folder / "out").string() + " --calibration " + phi.string());
   EXPECT_EQ(apply.code, 0) << apply.output;

@@ -20,7 +20,10 @@ struct Options {
 int calibrate(const Options& options) {
   const auto parameters = options.parameters.resolve();
   if (!parameters) return fail(parameters.error(), kUsage);
-  if (const Status status = check_output(options.out, ".json"); !status) return fail(status.error(), kUsage);
+  if (const Status status = check_output(options.out, ""); !status) return fail(status.error(), kUsage);
+  // An earlier calibration may be replaced, nothing else.
+  if (std::error_code failure; std::filesystem::is_regular_file(options.out, failure) && !read_calibration(options.out))
+    return fail({options.out + ": exists and is no calibration; name another file"}, kUsage);
   const auto recording = open_recording(options.input, print_log(), options.poses);
   if (!recording) return fail(recording.error());
   listen_for_interrupt();
@@ -65,7 +68,7 @@ Run add_calibrate(CLI::App& program) {
       "learnt from: 0 = a surface always reads the same, 1 = its reading says nothing.\n\n"
       "Example: revisit calibrate kitti/sequences/00 --out hdl64.json");
   command->add_option("recording", options->input, "Recording of a moving sensor")->required();
-  command->add_option("--out", options->out, "The calibration to write, .json")->required();
+  command->add_option("--out", options->out, "The calibration to write (JSON)")->required();
   command->add_option("--scans", options->scans, "Learn from the first scans only")
       ->capture_default_str()
       ->check(CLI::Range(2, 200));

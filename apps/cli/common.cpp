@@ -83,7 +83,8 @@ int fail(const Error& error, int code) {
 
 Status check_output(const std::string& file, const std::string& extension) {
   const std::filesystem::path path = file;
-  if (path.extension() != extension) return Error{file + ": is written as " + extension + "; name it so"};
+  if (!extension.empty() && path.extension() != extension)
+    return Error{file + ": is written as " + extension + "; name it so"};
   std::error_code failure;
   const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
   if (!std::filesystem::is_directory(folder, failure)) return Error{folder.string() + ": no such folder"};

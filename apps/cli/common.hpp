@@ -56,7 +56,8 @@ LogSink print_log();
 /// Prints the error and what the shell is told.
 int fail(const Error& error, int code = kFailed);
 
-/// Why the file cannot be the output of a command: another ending than `extension`, or a folder that does not exist.
+/// Why the file cannot be the output of a command: another ending than `extension` (if one is asked for), or a folder
+/// that does not exist.
 Status check_output(const std::string& file, const std::string& extension);
 
 /// What the shell passed to the program, its own name left out.

@@ -15,7 +15,7 @@ constexpr float kLongestSweep_s = 0.25f, kMostRings = 256.f;
 constexpr std::size_t kFewestReadings = 1000;  // below that, nothing can be said about repetition
 
 double quantile(std::vector<float>& values, double share) {
-  const auto rank = static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5);
+  const auto rank = static_cast<std::size_t>(std::lround(share * static_cast<double>(values.size() - 1)));
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(rank), values.end());
   return static_cast<double>(values[rank]);
 }
@@ -29,15 +29,12 @@ bool looks_like_ring_and_time(const Scan& scan) {
     sweep_fractions += p.intensity - std::floor(p.intensity) <= kLongestSweep_s;
   }
   std::sort(readings.begin(), readings.end());
+  const float lowest = readings.front(), highest = readings.back();
   const auto points = static_cast<double>(readings.size());
   const auto distinct = std::unique(readings.begin(), readings.end()) - readings.begin();
   return static_cast<double>(distinct) > kShareOfDistinctReadings * points &&
-         static_cast<double>(sweep_fractions) > kShareOfSweepFractions * points && scan.points.size() > 0 &&
-         readings.front() >= 0.f &&
-         *std::max_element(
-             readings.begin(),
-             readings.begin() +
-                 distinct)<kMostRings&& * std::max_element(readings.begin(), readings.begin() + distinct)> 2.f;
+         static_cast<double>(sweep_fractions) > kShareOfSweepFractions * points && lowest >= 0.f && highest > 2.f &&
+         highest < kMostRings;
 }
 
 }  // namespace
