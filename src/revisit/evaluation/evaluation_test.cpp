@@ -60,6 +60,13 @@ TEST(RetrievalTable, CountsByHand) {
   ASSERT_EQ(table.curve.size(), 4u);
 }
 
+TEST(RetrievalTable, AFrameThatMayNotBeMatchedIsNoRightAnswer) {
+  // Frames 102 and 99 are 2 m apart, but 3 frames: 102 is no revisit, and an answer to it is false.
+  const RetrievalTable table = evaluate_retrieval({answer(102, 99, 0.9), answer(150, 49, 0.8)}, there_and_back());
+  EXPECT_EQ(table.right, 1u);
+  EXPECT_EQ(table.recall_at_p100, 0.0);
+}
+
 TEST(RetrievalTable, EqualScoresAreOneStep) {
   const Reference reference = there_and_back();
   const std::vector<CandidateRow> rows = {answer(150, 49, 0.9), answer(152, 10, 0.9), answer(151, 48, 0.9)};
