@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <random>
 #include <vector>
 
 #include <revisit/descriptors/similarity.hpp>
@@ -12,6 +11,7 @@
 #include <revisit/pipeline/prepare.hpp>
 #include <revisit/verification/temporal.hpp>
 
+#include "random_points.hpp"
 #include "shared_data.hpp"
 
 namespace revisit {
@@ -106,14 +106,7 @@ void expect_equal(const std::vector<Point>& query, const std::vector<Point>& can
   EXPECT_NEAR(fast.intensity_score, intensity_by_the_page(q, c, k), 1e-12);
 }
 
-std::vector<Point> random_points(std::size_t count, unsigned seed) {
-  std::mt19937 random(seed);
-  std::normal_distribution<float> at(0.f, 20.f);
-  std::uniform_real_distribution<float> reading(0.f, 1.f);
-  std::vector<Point> points(count);
-  for (Point& p : points) p = {at(random), at(random), 0.f, reading(random)};
-  return points;
-}
+using testing_support::random_points;
 
 TEST(PaperEquations, HoldOnRandomScans) {
   for (unsigned seed = 0; seed < 6; ++seed) {

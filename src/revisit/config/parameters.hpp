@@ -32,7 +32,7 @@ struct DescriptorOptions {
   int min_occupied_cells = 12;  ///< fewer occupied cells describe no place
 };
 
-/// The two search stages (paper, section III-C) and who may be matched (docs/protocol in results).
+/// The two search stages (paper, section III-C) and who may be matched (docs/evaluation.md).
 struct RetrievalOptions {
   int top_k = 5;                     ///< candidates returned, best first
   int shortlist = 200;               ///< places of best geometry score that enter the intensity stage; 0 = all
@@ -42,7 +42,7 @@ struct RetrievalOptions {
   double exclude_s = 30.0;           ///< places less time before the query are not searched
 };
 
-/// Temporal consistency (paper, eq. 10).
+/// Temporal consistency (paper, eq. 11).
 struct TemporalOptions {
   int frames = 5;          ///< N, pairs of preceding frames averaged
   double min_score = 0.0;  ///< xi, on Phi_g + Phi_i; 0 = reported but never refused

@@ -11,12 +11,12 @@ namespace revisit {
 /// An earlier place that looks like the query, as retrieval found it.
 struct LoopCandidate {
   FrameId match;
-  double geometry_score = 0.0;   ///< Phi_g, eq. 7: [0, 1], at the best column shift
-  double intensity_score = 0.0;  ///< Phi_i, eq. 9: [0, 1], at the same shift
+  double geometry_score = 0.0;   ///< Phi_g, eq. 8: [0, 1], at the best column shift
+  double intensity_score = 0.0;  ///< Phi_i, eq. 10: [0, 1], at the same shift
   int shift_columns = 0;         ///< k: column j of the query lies on column j + k of the match
   double yaw_rad = 0.0;          ///< heading of the query in the match's frame, k * 2 pi / N_s, in [-pi, pi)
 
-  /// What retrieval ranks by, the summand of eq. 10: [0, 2].
+  /// What retrieval ranks by, the summand of eq. 11: [0, 2].
   double score() const { return geometry_score + intensity_score; }
 };
 

@@ -2,22 +2,16 @@
 #include <revisit/descriptors/intensity_scan_context.hpp>
 
 #include <cmath>
-#include <random>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
 
+#include "random_points.hpp"
+
 namespace revisit {
 namespace {
 
-std::vector<Point> random_points(std::size_t count, unsigned seed) {
-  std::mt19937 random(seed);
-  std::normal_distribution<float> at(0.f, 25.f);
-  std::uniform_real_distribution<float> reading(0.f, 1.f);
-  std::vector<Point> points(count);
-  for (Point& p : points) p = {at(random), at(random), 0.1f * at(random), reading(random)};
-  return points;
-}
+using testing_support::random_points;
 
 TEST(Describe, ACellIsWhatItsPointsMakeIt) {
   DescriptorOptions options;

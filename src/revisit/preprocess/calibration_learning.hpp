@@ -26,7 +26,7 @@ struct CalibrationReport {
 class CalibrationLearner {
  public:
   /// Adds one scan, its intensities normalised with the identity calibration, and its pose. `rings` may be empty.
-  /// Scans must overlap; every scan after the first `kMostFrames` is ignored.
+  /// Scans must overlap; every scan after the 200th is ignored.
   void add(const Scan& scan, const std::vector<std::uint16_t>& rings, const Pose& T_world_lidar);
 
   /// An error says what the recording lacks.

@@ -2,24 +2,18 @@
 #include <revisit/retrieval/place_index.hpp>
 
 #include <algorithm>
-#include <random>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
 
 #include <revisit/descriptors/similarity.hpp>
 
+#include "random_points.hpp"
+
 namespace revisit {
 namespace {
 
-IntensityScanContext random_context(unsigned seed) {
-  std::mt19937 random(seed);
-  std::normal_distribution<float> at(0.f, 20.f);
-  std::uniform_real_distribution<float> reading(0.f, 1.f);
-  std::vector<Point> points(600);
-  for (Point& p : points) p = {at(random), at(random), 0.f, reading(random)};
-  return describe(points, {});
-}
+IntensityScanContext random_context(unsigned seed) { return describe(testing_support::random_points(600, seed), {}); }
 
 PlaceIndex filled(const RetrievalOptions& options, int places) {
   PlaceIndex index(options);

@@ -2,23 +2,17 @@
 #include <revisit/verification/temporal.hpp>
 
 #include <map>
-#include <random>
 
 #include <gtest/gtest.h>
 
 #include <revisit/descriptors/similarity.hpp>
 
+#include "random_points.hpp"
+
 namespace revisit {
 namespace {
 
-IntensityScanContext place(unsigned seed) {
-  std::mt19937 random(seed);
-  std::normal_distribution<float> at(0.f, 20.f);
-  std::uniform_real_distribution<float> reading(0.f, 1.f);
-  std::vector<Point> points(500);
-  for (Point& p : points) p = {at(random), at(random), 0.f, reading(random)};
-  return describe(points, {});
-}
+IntensityScanContext place(unsigned seed) { return describe(testing_support::random_points(500, seed), {}); }
 
 // A drive over the places 0..9, later again: forward as frames 100..109, and backward as frames 200..209.
 class TemporalConsistency : public testing::Test {
