@@ -34,6 +34,7 @@ DOORS = {
     "nanoflann": {"src/revisit/registration"},
     "toml++": {"src/revisit/config"},
     "nlohmann/": {"src/revisit/io", "src/revisit/config", "apps"},
+    "embree": {"src/revisit/simulation"},
     "cairo": {"apps/cli"},
     "CLI/": {"apps/cli"},
     "spdlog/": {"apps/cli"},

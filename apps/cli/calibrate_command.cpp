@@ -24,7 +24,7 @@ int calibrate(const Options& options) {
   // An earlier calibration may be replaced, nothing else.
   if (std::error_code failure; std::filesystem::is_regular_file(options.out, failure) && !read_calibration(options.out))
     return fail({options.out + ": exists and is no calibration; name another file"}, kUsage);
-  const auto recording = open_recording(options.input, print_log(), options.poses);
+  const auto recording = open_input(options.input, options.poses);
   if (!recording) return fail(recording.error());
   listen_for_interrupt();
   Result<CalibrationReport> report = Error{};

@@ -9,6 +9,7 @@
 
 #include <revisit/config/parameter_file.hpp>
 #include <revisit/io/calibration_file.hpp>
+#include <revisit/simulation/simulated_recording.hpp>
 
 namespace revisit::cli {
 namespace {
@@ -31,7 +32,7 @@ spdlog::logger& logger() {
 
 }  // namespace
 
-void ParameterFlags::add_to(CLI::App& command, const std::vector<std::string>& sections) {
+void ParameterFlags::add_to(CLI::App& command, const std::vector<std::string>& sections, Names names) {
   std::string presets;
   for (const auto& name : preset_names()) presets += (presets.empty() ? "" : ", ") + name;
   command.add_option("--preset", preset_, "Parameters to start from: " + presets)->capture_default_str();
@@ -39,12 +40,14 @@ void ParameterFlags::add_to(CLI::App& command, const std::vector<std::string>& s
                      "TOML file of parameters, over the preset (`revisit parameters` prints one)");
   for (const ParameterInfo& info : parameter_infos()) {
     const std::string section = info.name.substr(0, info.name.find('.'));
-    if (!sections.empty() && std::find(sections.begin(), sections.end(), section) == sections.end()) continue;
+    const bool is_named = std::find(sections.begin(), sections.end(), section) != sections.end();
+    if (sections.empty() ? section == "simulation" : !is_named) continue;
     const std::string range =
-        info.is_switch ? "true or false" : CLI::detail::to_string(info.min) + " to " + CLI::detail::to_string(info.max);
+        info.is_text     ? "text"
+        : info.is_switch ? "true or false" : CLI::detail::to_string(info.min) + " to " + CLI::detail::to_string(info.max);
     command
         .add_option_function<std::string>(
-            "--" + info.name, [this, name = info.name](const std::string& value) { values_[name] = value; },
+            "--" + (names == Names::kShort ? info.name.substr(section.size() + 1) : info.name), [this, name = info.name](const std::string& value) { values_[name] = value; },
             info.help + " [" + info.default_value + "; " + range + "]")
         ->type_name("")
         ->group("Parameters [default; allowed], over the file");
@@ -60,6 +63,22 @@ Result<Parameters> ParameterFlags::resolve() const {
       return Error{"--" + name + ": " + status.error().message};
   if (const Status status = validate(*parameters); !status) return status.error();
   return parameters;
+}
+
+Result<std::unique_ptr<Recording>> open_input(const std::string& input, const std::string& poses_file,
+                                              Parameters* parameters) {
+  if (std::filesystem::path(input).extension() != ".toml") return open_recording(input, print_log(), poses_file);
+  if (!poses_file.empty()) return Error{poses_file + ": a simulated recording has its own, exact poses"};
+  auto described = read_parameters(input);
+  if (!described) return described.error();
+  // A trajectory is named as seen from the file.
+  std::string& trajectory = described->simulation.trajectory;
+  if (!trajectory.empty())
+    trajectory = (std::filesystem::path(input).parent_path() / trajectory).lexically_normal().string();
+  auto recording = simulate(described->simulation, print_log());
+  if (!recording) return recording.error();
+  if (parameters != nullptr) parameters->simulation = described->simulation;
+  return std::unique_ptr<Recording>(*std::move(recording));
 }
 
 Result<IntensityCalibration> load_calibration(const std::string& file) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -34,12 +35,15 @@ Run add_describe(CLI::App& program);
 Run add_calibrate(CLI::App& program);
 Run add_info(CLI::App& program);
 Run add_parameters(CLI::App& program);
+Run add_simulate(CLI::App& program);
 
 /// The flags that choose parameters: --preset, --parameters FILE, and one flag a parameter, in this order of strength.
 class ParameterFlags {
  public:
-  /// Only the parameters of the named sections become flags; all where none is named.
-  void add_to(CLI::App& command, const std::vector<std::string>& sections = {});
+  enum class Names { kWithSection, kShort };  ///< --simulation.seed or --seed
+
+  /// The parameters of the named sections become flags; where none is named, those of all but the simulation.
+  void add_to(CLI::App& command, const std::vector<std::string>& sections = {}, Names names = Names::kWithSection);
   Result<Parameters> resolve() const;
 
  private:
@@ -47,6 +51,11 @@ class ParameterFlags {
   std::string file_;
   std::map<std::string, std::string> values_;
 };
+
+/// A recording on the disk, or the one that a file of parameters (.toml) describes, simulated while it is read; its
+/// options then stand in `parameters`, if given.
+Result<std::unique_ptr<Recording>> open_input(const std::string& input, const std::string& poses_file = {},
+                                              Parameters* parameters = nullptr);
 
 /// The calibration in `file`, or the identity where no file was named.
 Result<IntensityCalibration> load_calibration(const std::string& file);

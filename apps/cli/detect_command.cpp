@@ -107,14 +107,14 @@ Status write_poses(const std::filesystem::path& folder, const Recording& recordi
 }
 
 int detect(const Options& options) {
-  const auto parameters = options.parameters.resolve();
+  auto parameters = options.parameters.resolve();
   if (!parameters) return fail(parameters.error(), kUsage);
   const auto calibration = load_calibration(options.calibration);
   if (!calibration) return fail(calibration.error());
-  const auto recording = open_recording(options.input, print_log(), options.poses);
+  const auto recording = open_input(options.input, options.poses, &*parameters);
   if (!recording) return fail(recording.error());
   Result<std::unique_ptr<Recording>> database = std::unique_ptr<Recording>();
-  if (!options.database.empty()) database = open_recording(options.database, print_log());
+  if (!options.database.empty()) database = open_input(options.database);
   if (!database) return fail(database.error());
 
   RunFile run;
@@ -179,7 +179,7 @@ Run add_detect(CLI::App& program) {
       "  poses.txt/.tum  the poses that came with the recording, if any, and the calib.txt that poses.txt needs\n"
       "  run.json        version, parameters, counts, milliseconds a stage\n\n"
       "Example: revisit detect kitti/sequences/00 --out results/00");
-  command->add_option("input", options->input, "Recording: KITTI folder, KITTI raw drive, or folder of scans")
+  command->add_option("input", options->input, "Recording: KITTI folder, KITTI raw drive, folder of scans, or .toml of a simulated drive")
       ->required();
   command->add_option("--out", options->out, "Folder for the results")->required();
   command->add_option("--database", options->database,

@@ -51,8 +51,8 @@ Result<std::optional<Pose>> find_camera_calibration(const Options& options, cons
 Result<Trajectory> load_reference(const Options& options, const Recording* recording) {
   Trajectory all;
   std::error_code failure;
-  if (fs::is_directory(options.reference, failure)) {
-    const auto other = open_recording(options.reference, print_log());
+  if (fs::is_directory(options.reference, failure) || fs::path(options.reference).extension() == ".toml") {
+    const auto other = open_input(options.reference);
     if (!other) return other.error();
     all = (*other)->trajectory();
   } else {
@@ -100,7 +100,7 @@ int evaluate(const Options& options) {
   const std::string recording_folder = !options.recording.empty() ? options.recording : facts.input;
   std::unique_ptr<Recording> recording;
   if (!options.recording.empty() || fs::exists(recording_folder, failure)) {
-    auto opened = open_recording(recording_folder, print_log());
+    auto opened = open_input(recording_folder);
     if (!opened) return fail(opened.error());
     recording = *std::move(opened);
   } else {

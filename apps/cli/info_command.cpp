@@ -43,7 +43,7 @@ int info_of_file(const std::string& file, const Parameters& parameters) {
 }
 
 int info_of_recording(const std::string& folder, const Parameters& parameters) {
-  const auto opened = open_recording(folder, print_log());
+  const auto opened = open_input(folder);
   if (!opened) return fail(opened.error());
   const Recording& recording = **opened;
   const std::size_t last = recording.size() - 1;
@@ -93,7 +93,7 @@ Run add_info(CLI::App& program) {
   return [options]() -> int {
     const auto parameters = options->parameters.resolve();
     if (!parameters) return fail(parameters.error(), kUsage);
-    return std::filesystem::is_directory(options->input) ? info_of_recording(options->input, *parameters)
+    return std::filesystem::is_directory(options->input) || std::filesystem::path(options->input).extension() == ".toml" ? info_of_recording(options->input, *parameters)
                                                          : info_of_file(options->input, *parameters);
   };
 }

@@ -16,9 +16,11 @@ Status write_run(const std::filesystem::path& file, const RunFile& run) {
       {"database", run.database},       {"poses", run.poses},
       {"calibration", run.calibration}, {"arguments", run.arguments},
       {"interrupted", run.interrupted}, {"parameters", nlohmann::ordered_json::object()}};
+  const bool is_simulated = std::filesystem::path(run.input).extension() == ".toml";
   for (const ParameterInfo& info : parameter_infos()) {
     const std::string value = get_parameter(run.parameters, info.name);
-    document["parameters"][info.name] = nlohmann::ordered_json::parse(value);
+    if (info.name.starts_with("simulation.") && !is_simulated) continue;
+    document["parameters"][info.name] = info.is_text ? nlohmann::ordered_json(value) : nlohmann::ordered_json::parse(value);
   }
   document["intensity"] = {{"min", run.intensity.min_raw},
                            {"median", run.intensity.median_raw},

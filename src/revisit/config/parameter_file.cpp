@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/config/parameter_file.hpp>
 
+#include <algorithm>
 #include <sstream>
 
 #include <toml++/toml.h>
@@ -12,10 +13,16 @@ std::string place(const std::filesystem::path& file, const toml::node& node) {
   return file.string() + ":" + std::to_string(node.source().begin.line) + ": ";
 }
 
-std::string as_text(const toml::node& value) {
+std::string as_text(const toml::node& value, bool is_text) {
+  if (const auto* string = value.as_string()) return is_text ? string->get() : "'" + string->get() + "'";
   std::ostringstream text;
   value.visit([&](const auto& concrete) { text << concrete; });
   return text.str();
+}
+
+bool is_text_parameter(const std::string& name) {
+  const auto infos = parameter_infos();
+  return std::any_of(infos.begin(), infos.end(), [&](const auto& info) { return info.is_text && info.name == name; });
 }
 
 }  // namespace
@@ -36,7 +43,10 @@ Result<Parameters> read_parameters(const std::filesystem::path& file, Parameters
       return Error{place(file, body) + "'" + std::string(section.str()) + "' stands outside a [section]"};
     for (const auto& [field, value] : *fields) {
       const std::string name = std::string(section.str()) + "." + std::string(field.str());
-      if (const Status status = set_parameter(base, name, as_text(value)); !status)
+      if (is_text_parameter(name) && !value.is_string())
+        return Error{place(file, value) + name + " = " + as_text(value, true) +
+                     " is not allowed; allowed: a text in quotes"};
+      if (const Status status = set_parameter(base, name, as_text(value, is_text_parameter(name))); !status)
         return Error{place(file, value) + status.error().message};
     }
   }

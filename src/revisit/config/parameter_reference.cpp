@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <charconv>
+#include <cstdio>
 #include <sstream>
 
 #include <revisit/config/parameter_file.hpp>
@@ -11,6 +11,7 @@ std::string section_of(const std::string& name) { return name.substr(0, name.fin
 std::string field_of(const std::string& name) { return name.substr(name.find('.') + 1); }
 
 std::string allowed(const ParameterInfo& info) {
+  if (info.is_text) return "";
   if (info.is_switch) return "true or false";
   std::ostringstream text;
   text << info.min << " to " << info.max << (info.is_integer ? ", whole" : "");
@@ -19,15 +20,34 @@ std::string allowed(const ParameterInfo& info) {
 
 }  // namespace
 
-std::string to_toml(const Parameters& parameters) {
+// A TOML string; file names may hold anything.
+std::string quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    char code[8];
+    if (c == '"' || c == '\\') result += '\\';
+    if (static_cast<unsigned char>(c) < 0x20) {
+      std::snprintf(code, sizeof code, "\\u%04x", static_cast<unsigned>(c));
+      result += code;
+    } else {
+      result += c;
+    }
+  }
+  return result + "\"";
+}
+
+std::string to_toml(const Parameters& parameters, std::string_view only_section) {
   std::ostringstream text;
   std::string section;
   for (const ParameterInfo& info : parameter_infos()) {
+    if (!only_section.empty() && section_of(info.name) != only_section) continue;
     if (section_of(info.name) != section) {
       text << (section.empty() ? "" : "\n") << "[" << section_of(info.name) << "]\n";
       section = section_of(info.name);
     }
-    text << field_of(info.name) << " = " << get_parameter(parameters, info.name) << "  # " << info.help << "\n";
+    text << field_of(info.name) << " = "
+         << (info.is_text ? quoted(get_parameter(parameters, info.name)) : get_parameter(parameters, info.name))
+         << "  # " << info.help << "\n";
   }
   return text.str();
 }

@@ -13,7 +13,7 @@ namespace revisit {
 namespace {
 
 using Field = std::variant<std::function<double&(Parameters&)>, std::function<int&(Parameters&)>,
-                           std::function<bool&(Parameters&)>>;
+                           std::function<bool&(Parameters&)>, std::function<std::string&(Parameters&)>>;
 
 struct Entry {
   std::string name;
@@ -30,6 +30,9 @@ struct Entry {
   Entry { #section "." #field, REVISIT_FIELD(int, section, field), min, max, help }
 #define REVISIT_SWITCH(section, field, help) \
   Entry { #section "." #field, REVISIT_FIELD(bool, section, field), 0, 0, help }
+
+#define REVISIT_TEXT(section, field, help) \
+  Entry { #section "." #field, REVISIT_FIELD(std::string, section, field), 0, 0, help }
 
 // The one table from which flags, file format, validation and reference page are made.
 const std::vector<Entry>& table() {
@@ -67,10 +70,23 @@ const std::vector<Entry>& table() {
       REVISIT_REAL(geometric, min_inlier_ratio, 0, 1,
                    "share of the points above ground, in both directions, that must be inliers"),
       REVISIT_REAL(geometric, max_translation_m, 0.1, 1000, "a longer relative translation is refused"),
+      REVISIT_TEXT(simulation, world, "what is driven through: town or warehouse"),
+      REVISIT_TEXT(simulation, sensor, "what looks about: hdl64e, vlp16, os0-128 or rosette"),
+      REVISIT_TEXT(simulation, trajectory,
+                   "pose file (KITTI, TUM, g2o) to drive along; without, the world has a drive of its own"),
+      REVISIT_INTEGER(simulation, seed, 0, 1000000000,
+                      "another number, another world; the same number, the same bytes"),
+      REVISIT_REAL(simulation, length_m, 20, 50000, "length of a drive of its own"),
+      REVISIT_INTEGER(simulation, frames, 0, 10000000, "only the first so many scans; 0 for all of the drive"),
+      REVISIT_REAL(simulation, tilt_deg, 0, 40, "how far a sensor carried by hand leans to and fro, at most"),
+      REVISIT_SWITCH(simulation, motion_distortion,
+                     "the sensor moves on while it sweeps; false: each scan is taken at once"),
+      REVISIT_REAL(simulation, traffic, 0, 5, "how many vehicles and people move about, as a multiple of the usual"),
   };
   return entries;
 }
 
+#undef REVISIT_TEXT
 #undef REVISIT_SWITCH
 #undef REVISIT_INTEGER
 #undef REVISIT_REAL
@@ -88,6 +104,8 @@ std::string value_text(const Entry& entry, Parameters& parameters) {
         const auto value = get(parameters);
         if constexpr (std::is_same_v<decltype(value), const bool>)
           return value ? "true" : "false";
+        else if constexpr (std::is_same_v<decltype(value), const std::string>)
+          return value;
         else
           return to_text(static_cast<double>(value));
       },
@@ -131,7 +149,8 @@ std::vector<ParameterInfo> parameter_infos() {
   for (const Entry& entry : table())
     infos.push_back({entry.name, entry.help, value_text(entry, defaults), entry.min, entry.max,
                      std::holds_alternative<std::function<bool&(Parameters&)>>(entry.field),
-                     std::holds_alternative<std::function<int&(Parameters&)>>(entry.field)});
+                     std::holds_alternative<std::function<int&(Parameters&)>>(entry.field),
+                     std::holds_alternative<std::function<std::string&(Parameters&)>>(entry.field)});
   return infos;
 }
 
@@ -173,6 +192,10 @@ Status set_parameter(Parameters& parameters, std::string_view name, std::string_
   if (const auto* get = std::get_if<std::function<bool&(Parameters&)>>(&entry->field)) {
     if (value != "true" && value != "false") return refuse("true or false");
     (*get)(parameters) = value == "true";
+    return ok();
+  }
+  if (const auto* get = std::get_if<std::function<std::string&(Parameters&)>>(&entry->field)) {
+    (*get)(parameters) = value;
     return ok();
   }
   double number = 0.0;

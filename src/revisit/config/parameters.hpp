@@ -60,6 +60,19 @@ struct GeometricOptions {
   double max_translation_m = 15.0;    ///< a longer relative translation is refused
 };
 
+/// A drive that is simulated instead of read (docs/simulation.md).
+struct SimulationOptions {
+  std::string world = "town";     ///< town or warehouse
+  std::string sensor = "hdl64e";  ///< a row of the table of sensors
+  std::string trajectory;         ///< pose file to drive along; empty: a drive of its own
+  int seed = 1;
+  double length_m = 1000.0;       ///< of a drive of its own
+  int frames = 0;                 ///< the first so many scans; 0: all of the drive
+  double tilt_deg = 0.0;          ///< how far a sensor carried by hand leans, at most
+  bool motion_distortion = true;  ///< the sensor moves while it sweeps
+  double traffic = 1.0;           ///< how many move about, as a share of the usual
+};
+
 /// Every parameter of the system, at the shipped defaults.
 struct Parameters {
   PreprocessOptions preprocess;
@@ -68,6 +81,7 @@ struct Parameters {
   RetrievalOptions retrieval;
   TemporalOptions temporal;
   GeometricOptions geometric;
+  SimulationOptions simulation;
 };
 
 /// One parameter as the user meets it. The name is `section.field`, the unit its suffix.
@@ -75,9 +89,10 @@ struct ParameterInfo {
   std::string name;
   std::string help;
   std::string default_value;
-  double min = 0.0, max = 0.0;  ///< inclusive; both 0 for a switch
+  double min = 0.0, max = 0.0;  ///< inclusive; both 0 for a switch or a text
   bool is_switch = false;
   bool is_integer = false;
+  bool is_text = false;
 };
 
 /// All parameters in the order of the reference page.

@@ -24,7 +24,7 @@ struct Scan {
   double stamp_s = 0.0;                ///< time of the scan, seconds, any epoch
   std::vector<Point> points;           ///< finite, never (0,0,0): readers drop and count those
   std::vector<std::uint16_t> rings;    ///< laser ring of each point, any numbering
-  std::vector<float> times_s;          ///< time of each point from the scan's first one, seconds
+  std::vector<float> times_s;          ///< time of each point from `stamp_s`, seconds; may be negative
   std::size_t dropped_non_finite = 0;  ///< points left out by the reader: NaN or infinite
   std::size_t dropped_at_origin = 0;   ///< points left out by the reader: exactly (0,0,0), "no return"
 };

@@ -146,6 +146,22 @@ Result<PoseFile> read_poses(const std::filesystem::path& file) {
   return poses;
 }
 
+Result<std::vector<std::pair<double, Eigen::Vector3d>>> read_tum_positions(const std::filesystem::path& file) {
+  const auto rows = io_internal::read_number_rows(file);
+  if (!rows) return rows.error();
+  std::vector<std::pair<double, Eigen::Vector3d>> positions;
+  for (const NumberRow& row : *rows) {
+    if (row.values.size() != 8)
+      return bad_row(file, row.line, std::to_string(row.values.size()) + " numbers; allowed: 8 (TUM)");
+    const Eigen::Vector3d position(row.values[1], row.values[2], row.values[3]);
+    if (!std::isfinite(row.values[0]) || !position.allFinite())
+      return bad_row(file, row.line, "a time or position is not finite");
+    positions.emplace_back(row.values[0], position);
+  }
+  if (positions.empty()) return Error{file.string() + ": holds no poses"};
+  return positions;
+}
+
 Status write_kitti_poses(const std::filesystem::path& file, const Trajectory& trajectory,
                          const std::optional<Pose>& T_camera_lidar) {
   constexpr std::int64_t kMostRows = 10'000'000;

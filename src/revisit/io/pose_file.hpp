@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <revisit/core/pose.hpp>
@@ -29,6 +30,9 @@ struct PoseFile {
 /// (VERTEX_SE3:QUAT); the form is recognised by content. KITTI rows of NaN are frames without a pose and are left out.
 /// A row that is no rigid transform is an error that names file and line.
 Result<PoseFile> read_poses(const std::filesystem::path& file);
+
+/// Times and positions of a TUM file whose rotations cannot be used.
+Result<std::vector<std::pair<double, Eigen::Vector3d>>> read_tum_positions(const std::filesystem::path& file);
 
 /// Row i holds frame i, from 0 to the last frame with a pose; frames without one are rows of NaN.
 /// The poses are written in the camera frame where `T_camera_lidar` is given: T_c0_ci = Tr T_l0_li Tr^-1.

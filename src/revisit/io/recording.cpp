@@ -28,6 +28,7 @@ class FolderRecording final : public Recording {
   bool has_times_ = false;
   Trajectory trajectory_;
   std::optional<Pose> T_camera_lidar_;
+  fs::path point_values_;  // where times and rings of points may stand
   LogSink log_;
 
   std::size_t size() const override { return scans_.size(); }
@@ -41,6 +42,10 @@ class FolderRecording final : public Recording {
   Result<Scan> read(std::size_t index) const override {
     auto scan = read_scan(scans_.at(index).file, log_);
     if (!scan) return scan;
+    if (!point_values_.empty())
+      if (const Status status = io_internal::read_point_values(point_values_, scans_[index].file.filename(), *scan);
+          !status)
+        return status.error();
     scan->frame = scans_[index].frame;
     scan->stamp_s = scans_[index].stamp_s;
     return scan;
@@ -130,6 +135,7 @@ Status set_stamps(FolderRecording& recording, const fs::path& file, const Result
 
 Status add_kitti_odometry(FolderRecording& recording, const fs::path& folder) {
   recording.kind_ = "KITTI odometry folder";
+  recording.point_values_ = folder;
   if (const auto file = folder / "times.txt"; is_present(file))
     if (const Status status = set_stamps(recording, file, io_internal::read_times(file)); !status) return status;
   if (const auto file = folder / "calib.txt"; is_present(file)) {

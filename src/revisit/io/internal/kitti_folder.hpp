@@ -8,6 +8,7 @@
 
 #include <revisit/core/pose.hpp>
 #include <revisit/core/result.hpp>
+#include <revisit/core/scan.hpp>
 
 namespace revisit::io_internal {
 
@@ -23,5 +24,8 @@ Result<std::vector<double>> read_timestamps(const std::filesystem::path& file);
 
 /// The IMU poses of a KITTI raw `oxts` folder, by the number in the file's name, in a local Mercator frame.
 Result<std::map<FrameId, Pose>> read_oxts(const std::filesystem::path& folder);
+
+/// Times and rings that stand beside a scan (`name` is its file's), where there are any.
+Status read_point_values(const std::filesystem::path& folder, const std::filesystem::path& name, Scan& scan);
 
 }  // namespace revisit::io_internal

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <iostream>
+#include <memory>
+
+#include <revisit/simulation/write_recording.hpp>
+
+#include "common.hpp"
+#include "progress.hpp"
+
+namespace revisit::cli {
+namespace {
+
+struct Options {
+  std::string out;
+  int threads = 0;
+  ParameterFlags parameters;
+};
+
+int run_simulation(const Options& options) {
+  const auto parameters = options.parameters.resolve();
+  if (!parameters) return fail(parameters.error(), kUsage);
+  const auto recording = simulate(parameters->simulation, print_log(), options.threads);
+  if (!recording) return fail(recording.error());
+
+  listen_for_interrupt();
+  std::size_t written = 0;
+  Status status = ok();
+  {
+    Progress progress("simulate", "scans", (*recording)->size());
+    status = write_recording(**recording, options.out, options.threads, [&](std::size_t done) {
+      progress.update(written = done);
+      return !interrupted();
+    });
+  }
+  if (!status) return fail(status.error());
+  std::cout << written << " scans of a " << (*recording)->kind() << ": " << options.out << "\n";
+  if (interrupted()) {
+    print_log()(LogLevel::kWarning, "interrupted: the folder holds the scans until here");
+    return kInterrupted;
+  }
+  return kDone;
+}
+
+}  // namespace
+
+Run add_simulate(CLI::App& program) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = program.add_subcommand("simulate", "Drive a LiDAR through a town or a warehouse, with exact truth.");
+  command->footer(
+      "Writes a KITTI odometry folder (formats: docs/formats.md):\n"
+      "  velodyne/           the scans; beside it velodyne_times/ and velodyne_rings/, one value a point\n"
+      "  poses.txt times.txt calib.txt\n"
+      "                      the exact poses, at the middle of each sweep\n"
+      "  wheel_odometry.tum odometry.tum\n"
+      "                      what wheels and a drifting odometry say\n"
+      "  simulation.toml     all of the above as parameters: `revisit detect simulation.toml --out results` drives it\n"
+      "                      again without writing a scan\n\n"
+      "Example: revisit simulate --out drive --sensor vlp16 --length_m 500\n"
+      "         revisit simulate --out kitti00 --trajectory kitti/poses/00.txt --seed 7");
+  command->add_option("--out", options->out, "New or empty folder for the recording")->required();
+  command->add_option("--threads", options->threads, "Threads to work on; 0 for all. The scans do not depend on it")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  options->parameters.add_to(*command, {"simulation"}, ParameterFlags::Names::kShort);
+  return [options] { return run_simulation(*options); };
+}
+
+}  // namespace revisit::cli

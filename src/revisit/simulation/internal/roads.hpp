@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <revisit/simulation/internal/path.hpp>
+#include <revisit/simulation/internal/terrain.hpp>
+
+namespace revisit::simulation_internal {
+
+/// The middle of a driven lane.
+struct LanePoint {
+  float x, y, cos_yaw, sin_yaw, arc_m;
+};
+
+/// Which lane is nearest to a place on the ground; built once, then asked for each beam that meets the ground.
+class Roads {
+ public:
+  /// Sides of the road seen from the middle of its right lane, metres to the left.
+  static constexpr float kRightEdge_m = -4.4f, kLeftEdge_m = 7.2f, kCentreLine_m = 1.7f, kPavement_m = 2.0f;
+
+  Roads() = default;
+  Roads(const std::vector<std::vector<Knot>>& lanes, const Terrain& grid);
+
+  struct Place {
+    float left_m, arc_m;
+  };
+  std::optional<Place> nearest(float x, float y) const;
+  const std::vector<LanePoint>& points() const { return points_; }
+
+ private:
+  std::vector<LanePoint> points_;
+  float x_min_ = 0.f, y_min_ = 0.f;
+  int columns_ = 0, rows_ = 0;
+  std::vector<std::uint32_t> first_;  ///< of each cell in `near_`
+  std::vector<std::uint32_t> near_;   ///< points near each cell
+};
+
+}  // namespace revisit::simulation_internal

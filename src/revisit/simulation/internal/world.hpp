@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <revisit/config/parameters.hpp>
+#include <revisit/core/log.hpp>
+#include <revisit/core/result.hpp>
+#include <revisit/simulation/internal/movers.hpp>
+#include <revisit/simulation/internal/path.hpp>
+#include <revisit/simulation/internal/roads.hpp>
+#include <revisit/simulation/internal/terrain.hpp>
+
+namespace revisit::simulation_internal {
+
+/// What a place on the ground is made of, and how far it stands above the terrain (pavements).
+struct Ground {
+  Material material = Material::kFloor;
+  float lift_m = 0.f;
+};
+
+/// Everything there is, and the way through it.
+struct World {
+  Path path;
+  Terrain terrain;
+  Roads roads;    ///< none in a warehouse
+  Solids solids;  ///< what never moves
+  Movers movers;
+  std::vector<Eigen::Vector2d> featureless;  ///< middles of stretches without features
+  std::uint64_t seed = 0;
+  double sensor_height_m = 1.73;
+
+  Ground ground_at(float x, float y) const;
+};
+
+/// Kinds of neighbourhood in a town.
+enum class District : std::uint8_t { kRows, kDetached, kCommercial, kPark, kFeatureless };
+District district_at(const World& world, double x, double y);
+
+/// A town along the path of options.trajectory, or along a drive through its own streets.
+Result<World> build_town(const SimulationOptions& options, const LogSink& log);
+/// A hall with a robot that leaves its dock and comes back the same way.
+Result<World> build_warehouse(const SimulationOptions& options);
+
+/// A drive of `length_m` through a network of streets: blocks around which it goes twice, the same way and the other
+/// way, on either of two lanes. `streets` are all streets of the network near the drive.
+struct StreetDrive {
+  Path path;
+  std::vector<std::vector<Knot>> streets;
+};
+StreetDrive drive_through_streets(double length_m, std::uint64_t seed);
+
+/// Fills the town along its roads.
+void populate_town(World& world, double traffic);
+
+}  // namespace revisit::simulation_internal

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/simulation/internal/ray_scene.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+#include <utility>
+
+#include <embree3/rtcore.h>
+
+namespace revisit::simulation_internal {
+namespace {
+
+constexpr float kMargin_m = 0.01f;  // boxes are larger than what is in them by more than any rounding
+
+struct Query {
+  RTCIntersectContext context;  // must come first: Embree hands it back
+  const Ray* ray;
+  Met* met;
+};
+
+template <typename Thing>
+struct Things {
+  const Thing* list = nullptr;
+  float time_reach_s = 0.f;
+};
+
+RTCBounds bounds_of(const Eigen::Vector3f& low, const Eigen::Vector3f& high) {
+  return {low.x() - kMargin_m,  low.y() - kMargin_m,  low.z() - kMargin_m,  0.f,
+          high.x() + kMargin_m, high.y() + kMargin_m, high.z() + kMargin_m, 0.f};
+}
+
+void solid_bounds(const RTCBoundsFunctionArguments* arguments) {
+  const auto& things = *static_cast<const Things<Solid>*>(arguments->geometryUserPtr);
+  const Solid& solid = things.list[arguments->primID];
+  Eigen::Vector3f half = bounding_half(solid);
+  half.x() += std::abs(solid.velocity.x()) * things.time_reach_s;
+  half.y() += std::abs(solid.velocity.y()) * things.time_reach_s;
+  *arguments->bounds_o = bounds_of(solid.centre - half, solid.centre + half);
+}
+
+void cell_bounds(const RTCBoundsFunctionArguments* arguments) {
+  const Terrain::Cell& cell =
+      static_cast<const Things<Terrain::Cell>*>(arguments->geometryUserPtr)->list[arguments->primID];
+  constexpr auto kSize = static_cast<float>(Terrain::kCell_m);
+  const auto [low, high] = std::minmax({cell.h00, cell.h10, cell.h01, cell.h11});
+  *arguments->bounds_o = bounds_of({cell.x, cell.y, low}, {cell.x + kSize, cell.y + kSize, high});
+}
+
+// Of two things equally far, the one of the smaller kind and number counts, in whatever order they are tried.
+template <typename Thing, Met::What kWhat>
+void try_thing(const RTCIntersectFunctionNArguments* arguments) {
+  if (arguments->N != 1 || arguments->valid[0] == 0) return;
+  auto& query = *reinterpret_cast<Query*>(arguments->context);
+  const Thing& thing = static_cast<const Things<Thing>*>(arguments->geometryUserPtr)->list[arguments->primID];
+  Met& met = *query.met;
+  const bool wins_ties = std::pair(kWhat, arguments->primID) < std::pair(met.what, met.index);
+  const float limit = wins_ties ? std::nextafter(met.range_m, std::numeric_limits<float>::infinity()) : met.range_m;
+  const float range_m = intersect(thing, *query.ray, limit);
+  if (!(range_m < limit)) return;
+  met = {range_m, kWhat, arguments->primID};
+  auto* ray_hit = reinterpret_cast<RTCRayHit*>(arguments->rayhit);
+  ray_hit->ray.tfar = range_m;
+  ray_hit->hit.geomID = arguments->geomID;
+  ray_hit->hit.primID = arguments->primID;
+}
+
+}  // namespace
+
+struct RayScene::Embree {
+  RTCDevice device = nullptr;
+  RTCScene scene = nullptr;
+  Things<Solid> solids;
+  Things<Terrain::Cell> cells;
+
+  explicit Embree(RTCDevice of) : device(of) {  // takes over a reference to the device
+    if (device == nullptr) throw std::bad_alloc();
+    scene = rtcNewScene(device);
+    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+  }
+  ~Embree() {
+    rtcReleaseScene(scene);
+    rtcReleaseDevice(device);
+  }
+  Embree(const Embree&) = delete;
+  Embree& operator=(const Embree&) = delete;
+
+  template <typename Thing, Met::What kWhat>
+  void attach(Things<Thing>& things, std::size_t count, RTCBoundsFunction bounds) {
+    if (count == 0) return;
+    RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+    rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(count));
+    rtcSetGeometryUserData(geometry, &things);
+    rtcSetGeometryBoundsFunction(geometry, bounds, nullptr);
+    rtcSetGeometryIntersectFunction(geometry, &try_thing<Thing, kWhat>);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(scene, geometry);
+    rtcReleaseGeometry(geometry);
+  }
+  void commit() const {
+    rtcCommitScene(scene);
+    if (rtcGetDeviceError(device) != RTC_ERROR_NONE) throw std::bad_alloc();
+  }
+};
+
+RayScene::RayScene(const Solids& solids, const std::vector<Terrain::Cell>& ground, const std::string& embree_options)
+    : embree_(std::make_unique<Embree>(
+          rtcNewDevice(embree_options.c_str()))) {
+  embree_->solids.list = solids.data();
+  embree_->cells.list = ground.data();
+  embree_->attach<Solid, Met::What::kSolid>(embree_->solids, solids.size(), solid_bounds);
+  embree_->attach<Terrain::Cell, Met::What::kGround>(embree_->cells, ground.size(), cell_bounds);
+  embree_->commit();
+}
+
+RayScene::RayScene(const RayScene& fixed, const Solids& moving, float time_reach_s) {
+  rtcRetainDevice(fixed.embree_->device);
+  embree_ = std::make_unique<Embree>(fixed.embree_->device);
+  embree_->solids = {moving.data(), time_reach_s};
+  embree_->attach<Solid, Met::What::kMoving>(embree_->solids, moving.size(), solid_bounds);
+  embree_->commit();
+}
+
+RayScene::~RayScene() = default;
+
+void RayScene::trace(const Ray& ray, Met& met) const {
+  Query query;
+  rtcInitIntersectContext(&query.context);
+  query.ray = &ray;
+  query.met = &met;
+  RTCRayHit ray_hit;
+  ray_hit.ray.org_x = ray.origin.x();
+  ray_hit.ray.org_y = ray.origin.y();
+  ray_hit.ray.org_z = ray.origin.z();
+  ray_hit.ray.dir_x = ray.direction.x();
+  ray_hit.ray.dir_y = ray.direction.y();
+  ray_hit.ray.dir_z = ray.direction.z();
+  ray_hit.ray.tnear = 0.f;
+  ray_hit.ray.tfar = met.range_m;
+  ray_hit.ray.time = 0.f;
+  ray_hit.ray.mask = ~0u;
+  ray_hit.ray.id = 0;
+  ray_hit.ray.flags = 0;
+  ray_hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  ray_hit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  rtcIntersect1(embree_->scene, &query.context, &ray_hit);
+}
+
+}  // namespace revisit::simulation_internal

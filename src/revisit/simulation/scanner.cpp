@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/simulation/internal/scanner.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
+namespace revisit::simulation_internal {
+namespace {
+
+constexpr std::size_t kPoseKnots = 51;  // poses within a sweep, linear between them
+
+// A number of its own for each cell of space: what a surface looks like there, at every visit.
+float texture(const Eigen::Vector3f& p, float cells_per_metre) {
+  const auto part = [&](float x) {
+    return static_cast<std::uint64_t>(static_cast<std::uint32_t>(floor_int(x * cells_per_metre)) & 0xfffffu);
+  };
+  return uniform((part(p.x()) << 40) ^ (part(p.y()) << 20) ^ part(p.z()));
+}
+
+}  // namespace
+
+// Everything about one sweep that its beams share.
+struct Scanner::Sweep {
+  double time_s = 0.0;
+  std::uint64_t key = 0;
+  std::vector<Eigen::Matrix<float, 3, 4>> T_world_lidar;  ///< of each column (rotating), of each beam chunk (rosette)
+  std::vector<float> cos_azimuth, sin_azimuth;            ///< of each column
+  Solids moving;
+  std::unique_ptr<RayScene> scene;  ///< of what moves
+
+  float offset_s(std::size_t column, const SensorModel& sensor) const {
+    return static_cast<float>(((static_cast<double>(column) + 0.5) / sensor.columns - 0.5) * sensor.sweep_s);
+  }
+};
+
+Scanner::Scanner(const World& world, SensorModel sensor, const Options& options)
+    : world_(world),
+      sensor_(std::move(sensor)),
+      options_(options),
+      scene_(world.solids, world.terrain.cells(), options.embree_options) {
+  const std::size_t lines = std::max<std::size_t>(1, sensor_.elevations_deg.size());
+  for (std::size_t i = 0; i < lines; ++i) {
+    const double elevation = sensor_.rotates() ? to_radians(sensor_.elevations_deg[i]) : 0.0;
+    cos_elevation_.push_back(static_cast<float>(std::cos(elevation)));
+    sin_elevation_.push_back(static_cast<float>(std::sin(elevation)));
+    // Lines differ as built: the same at every sweep, another sensor another seed.
+    gain_.push_back(std::max(0.3f, 1.f + static_cast<float>(sensor_.gain_spread) * gaussian(mix(world.seed, 51, i))));
+    bias_m_.push_back(static_cast<float>(sensor_.line_bias_m) * gaussian(mix(world.seed, 52, i)));
+  }
+}
+
+Pose Scanner::T_world_lidar(double time_s) const {
+  const Knot at = world_.path.at(time_s);
+  const double c = std::cos(at.yaw_rad), s = std::sin(at.yaw_rad);
+  const auto ground = [&](double forward, double left) {
+    return world_.terrain.height(at.x + c * forward - s * left, at.y + s * forward + c * left);
+  };
+  constexpr double kAxle_m = 1.35, kWheel_m = 0.75;
+  const double front = ground(kAxle_m, 0), back = ground(-kAxle_m, 0), left = ground(0, kWheel_m),
+               right = ground(0, -kWheel_m);
+  double pitch = std::atan2(front - back, 2 * kAxle_m), roll = std::atan2(left - right, 2 * kWheel_m);
+  double z = 0.25 * (front + back + left + right);
+  if (!world_.roads.points().empty()) {  // springs
+    pitch += to_radians(0.4) * smooth_noise(mix(world_.seed, 61), time_s / 0.9);
+    roll += to_radians(0.5) * smooth_noise(mix(world_.seed, 62), time_s / 1.1);
+    z += 0.015 * smooth_noise(mix(world_.seed, 63), time_s / 0.7);
+  }
+  Pose T = Pose::Identity();
+  T.translate(Eigen::Vector3d(at.x, at.y, z));
+  T.rotate(Eigen::AngleAxisd(at.yaw_rad, Eigen::Vector3d::UnitZ()) *
+           Eigen::AngleAxisd(-pitch, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()));
+  if (options_.tilt_deg > 0.0) {  // as carried by hand: it sways, now and then as far as it may
+    Eigen::Vector3d tilt(1.6 * smooth_noise(mix(world_.seed, 64), time_s / 2.3),
+                         1.6 * smooth_noise(mix(world_.seed, 65), time_s / 2.9), 0.0);
+    tilt *= to_radians(options_.tilt_deg) / std::max(1.0, tilt.norm());
+    T.rotate(Eigen::AngleAxisd(tilt.norm(),
+                               tilt.norm() > 0 ? Eigen::Vector3d(tilt.normalized()) : Eigen::Vector3d::UnitX()));
+  }
+  T.translate(Eigen::Vector3d(0, 0, world_.sensor_height_m));
+  return T;
+}
+
+Eigen::Vector3f Scanner::direction(const Sweep& sweep, std::size_t line, std::size_t column) const {
+  if (sensor_.rotates())
+    return {cos_elevation_[line] * sweep.cos_azimuth[column], cos_elevation_[line] * sweep.sin_azimuth[column],
+            sin_elevation_[line]};
+  // Two prisms that turn against each other; their phases go on from sweep to sweep, so that none repeats.
+  const double time_s = sweep.time_s + static_cast<double>(sweep.offset_s(column, sensor_)) + sensor_.sweep_s;
+  const double a = 2 * kPi * 121.567 * time_s, b = -2 * kPi * 77.731 * time_s;
+  const double half = 0.5 * to_radians(sensor_.rosette_half_angle_deg);
+  const double azimuth = half * (std::cos(a) + std::cos(b)), elevation = half * (std::sin(a) + std::sin(b));
+  return Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
+                         std::sin(elevation))
+      .cast<float>();
+}
+
+// What the neighbouring beam has met is tried first: mostly it is met again, and the search need not look behind it.
+Met Scanner::meet(const Sweep& sweep, const Ray& ray, const Met& neighbour) const {
+  Met met;
+  const auto try_again = [&](float range_m) {
+    if (std::isfinite(range_m)) met = {range_m, neighbour.what, neighbour.index};
+  };
+  const float reach_m = static_cast<float>(sensor_.max_range_m);
+  if (neighbour.what == Met::What::kSolid) try_again(intersect(world_.solids[neighbour.index], ray, reach_m));
+  if (neighbour.what == Met::What::kGround) try_again(intersect(world_.terrain.cells()[neighbour.index], ray, reach_m));
+  if (met.what == Met::What::kNothing) met.range_m = reach_m;
+  scene_.trace(ray, met);
+  if (sweep.scene) sweep.scene->trace(ray, met);
+  return met;
+}
+
+Hit Scanner::look_at(const Sweep& sweep, const Ray& ray, const Met& met) const {
+  constexpr float kBeyond = std::numeric_limits<float>::infinity();
+  Hit hit;
+  if (met.what != Met::What::kGround) {
+    intersect(met.what == Met::What::kSolid ? world_.solids[met.index] : sweep.moving[met.index], ray, kBeyond, &hit);
+    return hit;
+  }
+  hit.range_m = intersect(world_.terrain.cells()[met.index], ray, kBeyond, &hit.normal);
+  const auto ground_at = [&](float range_m) {
+    return world_.ground_at(ray.origin.x() + range_m * ray.direction.x(), ray.origin.y() + range_m * ray.direction.y());
+  };
+  const Ground ground = ground_at(hit.range_m);
+  hit.material = ground.material;
+  if (ground.lift_m > 0.f) {  // the surface lies higher: the beam meets it, or its kerb, earlier
+    float outside = hit.range_m - ground.lift_m / std::max(0.02f, -hit.normal.dot(ray.direction)), inside = hit.range_m;
+    if (outside > 0.f && ground_at(outside).lift_m > 0.f) {
+      hit.range_m = outside;
+    } else {
+      outside = std::max(0.f, outside);
+      for (int i = 0; i < 5; ++i) {
+        const float middle = 0.5f * (outside + inside);
+        (ground_at(middle).lift_m > 0.f ? inside : outside) = middle;
+      }
+      hit.range_m = inside;
+      hit.normal = -Eigen::Vector3f(ray.direction.x(), ray.direction.y(), 0.f).normalized();
+    }
+  }
+  return hit;
+}
+
+Scanner::Return Scanner::measure(const Ray& ray, const Met& met, const Hit& hit, std::size_t line,
+                                 std::uint64_t key) const {
+  const Surface& surface = surface_of(hit.material);
+  const Eigen::Vector3f p = ray.origin + hit.range_m * ray.direction;
+  const float facing = std::abs(hit.normal.dot(ray.direction));
+  float range_m = hit.range_m;
+  if (surface.roughness_m > 0.f && met.what != Met::What::kMoving)
+    range_m += surface.roughness_m * (2.f * texture(p, 7.f) - 1.f) / std::max(0.3f, facing);
+  const float gloss = surface.gloss > 0.f ? surface.gloss * std::pow(facing, 16.f) : 0.f;
+  const float response = (1.f - surface.gloss) * (1.f - surface.flatness * (1.f - facing)) + gloss;
+  float strength = surface.reflectance * response * (1.f + surface.spread * (2.f * uniform(hit.object) - 1.f));
+  if (met.what != Met::What::kMoving) strength *= 0.88f + 0.24f * texture(p, 2.f);
+
+  // Weak answers get lost: sure to be seen well within the range, never beyond it.
+  const auto visible_m = static_cast<float>(sensor_.visible_10_percent_m);
+  const float margin = strength * 10.f * (visible_m / range_m) * (visible_m / range_m);
+  const std::uint64_t dice = mix(key, 1);
+  const float luck = static_cast<float>(dice >> 40) * 0x1p-24f, chance = static_cast<float>(dice & 0xffffff) * 0x1p-24f;
+  if (luck * 0.6f + 0.7f > margin || chance < static_cast<float>(sensor_.drop_out)) return {};
+
+  const double measured_m =
+      static_cast<double>(range_m + bias_m_[line] + static_cast<float>(sensor_.range_noise_m) * gaussian(mix(key, 2)));
+  const double stepped_m = sensor_.range_step_m * std::round(measured_m / sensor_.range_step_m);
+  if (!(stepped_m >= sensor_.min_range_m && stepped_m <= sensor_.max_range_m)) return {};
+
+  double reading = static_cast<double>(strength * gain_[line] *
+                                       (1.f + static_cast<float>(sensor_.intensity_noise) * gaussian(mix(key, 3)))) *
+                   sensor_.intensity_scale;
+  if (stepped_m > sensor_.focus_m) reading *= std::pow(sensor_.focus_m / stepped_m, sensor_.falloff);
+  reading =
+      std::clamp(sensor_.intensity_step * std::round(reading / sensor_.intensity_step), 0.0, sensor_.intensity_max);
+  Return result;
+  result.is_there = true;
+  result.point = {static_cast<float>(stepped_m), 0.f, 0.f, static_cast<float>(reading)};
+  return result;
+}
+
+void Scanner::cast(const Sweep& sweep, std::size_t first, std::size_t count, Return* returns) const {
+  Met neighbour;
+  for (std::size_t beam = first; beam < first + count; ++beam) {
+    const auto columns = static_cast<std::size_t>(sensor_.columns);
+    const std::size_t line = beam / columns, column = beam % columns;
+    const Eigen::Vector3f in_lidar = direction(sweep, line, column);
+    const auto& T = sweep.T_world_lidar[sweep.T_world_lidar.size() == 1 ? 0 : column];
+    const Ray ray{T.col(3), T.leftCols<3>() * in_lidar,
+                  options_.motion_distortion ? sweep.offset_s(column, sensor_) : 0.f};
+    const Met met = meet(sweep, ray, neighbour);
+    neighbour = met;
+    Return& result = returns[beam - first];
+    result.is_there = false;
+    if (met.what == Met::What::kNothing) continue;
+    result = measure(ray, met, look_at(sweep, ray, met), line, mix(sweep.key, beam));
+    const float range_m = result.point.x;
+    result.point.x = range_m * in_lidar.x();
+    result.point.y = range_m * in_lidar.y();
+    result.point.z = range_m * in_lidar.z();
+  }
+}
+
+Scan Scanner::sweep(std::int64_t frame, double time_s) const {
+  const auto columns = static_cast<std::size_t>(sensor_.columns);
+  const double half_s = 0.5 * sensor_.sweep_s;
+  Sweep sweep;
+  sweep.time_s = time_s;
+  sweep.key = mix(world_.seed, 71, static_cast<std::uint64_t>(frame));
+  sweep.moving =
+      world_.movers.at(time_s, world_.path, [this](double x, double y) { return world_.terrain.height(x, y); });
+  if (!sweep.moving.empty()) sweep.scene = std::make_unique<RayScene>(scene_, sweep.moving, static_cast<float>(half_s));
+
+  if (options_.motion_distortion) {
+    std::vector<Eigen::Matrix<float, 3, 4>> knots;
+    for (std::size_t k = 0; k < kPoseKnots; ++k)
+      knots.push_back(T_world_lidar(time_s - half_s + sensor_.sweep_s * static_cast<double>(k) / (kPoseKnots - 1))
+                          .matrix()
+                          .topRows<3>()
+                          .cast<float>());
+    for (std::size_t c = 0; c < columns; ++c) {
+      const float position =
+          (static_cast<float>(c) + 0.5f) / static_cast<float>(columns) * static_cast<float>(kPoseKnots - 1);
+      const auto k = std::min(static_cast<std::size_t>(position), kPoseKnots - 2);
+      sweep.T_world_lidar.push_back(knots[k] + (position - static_cast<float>(k)) * (knots[k + 1] - knots[k]));
+    }
+  } else {
+    sweep.T_world_lidar.push_back(T_world_lidar(time_s).matrix().topRows<3>().cast<float>());
+  }
+  const double phase = static_cast<double>(uniform(mix(sweep.key, 4)));
+  for (std::size_t c = 0; c < columns && sensor_.rotates(); ++c) {  // from behind, over the left... to behind
+    const double azimuth = 2 * kPi * (static_cast<double>(c) + phase) / sensor_.columns - kPi;
+    sweep.cos_azimuth.push_back(static_cast<float>(std::cos(azimuth)));
+    sweep.sin_azimuth.push_back(static_cast<float>(std::sin(azimuth)));
+  }
+
+  constexpr std::size_t kChunk = 1000;
+  std::vector<Return> returns(sensor_.beams());
+  tbb::task_arena arena(options_.threads > 0 ? options_.threads : tbb::task_arena::automatic);
+  arena.execute([&] {
+    tbb::parallel_for(std::size_t{0}, (returns.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+      const std::size_t first = chunk * kChunk;
+      cast(sweep, first, std::min(kChunk, returns.size() - first), returns.data() + first);
+    });
+  });
+
+  Scan scan;
+  scan.frame = FrameId{frame};
+  scan.stamp_s = time_s;
+  for (std::size_t beam = 0; beam < returns.size(); ++beam) {
+    if (!returns[beam].is_there) continue;
+    scan.points.push_back(returns[beam].point);
+    if (sensor_.rotates()) scan.rings.push_back(static_cast<std::uint16_t>(beam / columns));
+    if (options_.motion_distortion) scan.times_s.push_back(sweep.offset_s(beam % columns, sensor_));
+  }
+  return scan;
+}
+
+}  // namespace revisit::simulation_internal

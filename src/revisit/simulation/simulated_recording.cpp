@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/simulation/simulated_recording.hpp>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include <revisit/simulation/internal/odometry_model.hpp>
+#include <revisit/simulation/internal/scanner.hpp>
+
+namespace revisit {
+
+using simulation_internal::Path;
+using simulation_internal::Scanner;
+using simulation_internal::World;
+
+struct SimulatedRecording::Parts {
+  SimulationOptions options;
+  SensorModel sensor;
+  World world;
+  std::size_t size;
+  std::unique_ptr<Scanner> scanner;
+  Trajectory truth, wheels, drifting;
+};
+
+SimulatedRecording::SimulatedRecording(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+SimulatedRecording::~SimulatedRecording() = default;
+
+std::size_t SimulatedRecording::size() const { return parts_->size; }
+FrameId SimulatedRecording::frame(std::size_t index) const { return FrameId{static_cast<std::int64_t>(index)}; }
+double SimulatedRecording::stamp_s(std::size_t index) const { return Path::kStep_s * static_cast<double>(index); }
+std::string SimulatedRecording::kind() const {
+  return "simulated " + parts_->options.world + ", " + parts_->sensor.title + ", seed " +
+         std::to_string(parts_->options.seed);
+}
+const Trajectory& SimulatedRecording::trajectory() const { return parts_->truth; }
+const Trajectory& SimulatedRecording::wheel_odometry() const { return parts_->wheels; }
+const Trajectory& SimulatedRecording::drifting_odometry() const { return parts_->drifting; }
+const SimulationOptions& SimulatedRecording::options() const { return parts_->options; }
+const SensorModel& SimulatedRecording::sensor() const { return parts_->sensor; }
+
+std::optional<Pose> SimulatedRecording::T_camera_lidar() const {
+  Pose T = Pose::Identity();
+  T.linear() << 0, -1, 0, 0, 0, -1, 1, 0, 0;
+  return T;
+}
+
+Result<Scan> SimulatedRecording::read(std::size_t index) const {
+  if (index >= size()) throw std::out_of_range("scan " + std::to_string(index) + " of " + std::to_string(size()));
+  return parts_->scanner->sweep(static_cast<std::int64_t>(index), stamp_s(index));
+}
+
+Result<std::unique_ptr<SimulatedRecording>> simulate(const SimulationOptions& options, const LogSink& log,
+                                                     int threads) {
+  const auto sensor = find_sensor_model(options.sensor);
+  if (!sensor) return sensor.error();
+  if (options.world != "town" && options.world != "warehouse")
+    return Error{"simulation.world = '" + options.world + "' is not known; allowed: town, warehouse"};
+  auto world = options.world == "town" ? simulation_internal::build_town(options, log)
+                                       : simulation_internal::build_warehouse(options);
+  if (!world) return world.error();
+
+  auto parts = std::make_unique<SimulatedRecording::Parts>(
+      SimulatedRecording::Parts{options, *sensor, *std::move(world), 0, nullptr, {}, {}, {}});
+  parts->size = parts->world.path.knots().size();
+  if (options.frames > 0) parts->size = std::min(parts->size, static_cast<std::size_t>(options.frames));
+  parts->scanner = std::make_unique<Scanner>(
+      parts->world, *sensor, Scanner::Options{options.tilt_deg, options.motion_distortion, threads, ""});
+  for (std::size_t i = 0; i < parts->size; ++i) {
+    const double stamp_s = Path::kStep_s * static_cast<double>(i);
+    parts->truth.entries[FrameId{static_cast<std::int64_t>(i)}] = {stamp_s, parts->scanner->T_world_lidar(stamp_s)};
+  }
+  parts->wheels = simulation_internal::wheel_odometry(parts->truth, parts->world.seed);
+  parts->drifting = simulation_internal::drifting_odometry(parts->truth, parts->world.seed);
+  return std::unique_ptr<SimulatedRecording>(new SimulatedRecording(std::move(parts)));
+}
+
+}  // namespace revisit
