@@ -12,7 +12,7 @@ namespace {
 constexpr double kLongestStep_m = 6.0;  // between rows without times: 60 m/s at 10 Hz
 constexpr double kHighestSpeed_mps = 60.0;
 constexpr double kLongestGap_s = 2.0;
-constexpr double kLargestExtent_m = 20'000.0;
+constexpr double kLargestExtent_m = 8'000.0;
 
 struct Stop {
   double time_s;

@@ -15,8 +15,8 @@ constexpr float kMargin_m = 0.01f;  // boxes are larger than what is in them by 
 
 struct Query {
   RTCIntersectContext context;  // must come first: Embree hands it back
-  const Ray* ray;
-  Met* met;
+  const Ray* rays;
+  Met* mets;
 };
 
 template <typename Thing>
@@ -50,19 +50,23 @@ void cell_bounds(const RTCBoundsFunctionArguments* arguments) {
 // Of two things equally far, the one of the smaller kind and number counts, in whatever order they are tried.
 template <typename Thing, Met::What kWhat>
 void try_thing(const RTCIntersectFunctionNArguments* arguments) {
-  if (arguments->N != 1 || arguments->valid[0] == 0) return;
-  auto& query = *reinterpret_cast<Query*>(arguments->context);
+  const auto& query = *reinterpret_cast<const Query*>(arguments->context);
   const Thing& thing = static_cast<const Things<Thing>*>(arguments->geometryUserPtr)->list[arguments->primID];
-  Met& met = *query.met;
-  const bool wins_ties = std::pair(kWhat, arguments->primID) < std::pair(met.what, met.index);
-  const float limit = wins_ties ? std::nextafter(met.range_m, std::numeric_limits<float>::infinity()) : met.range_m;
-  const float range_m = intersect(thing, *query.ray, limit);
-  if (!(range_m < limit)) return;
-  met = {range_m, kWhat, arguments->primID};
-  auto* ray_hit = reinterpret_cast<RTCRayHit*>(arguments->rayhit);
-  ray_hit->ray.tfar = range_m;
-  ray_hit->hit.geomID = arguments->geomID;
-  ray_hit->hit.primID = arguments->primID;
+  RTCRayN* rays = RTCRayHitN_RayN(arguments->rayhit, arguments->N);
+  RTCHitN* hits = RTCRayHitN_HitN(arguments->rayhit, arguments->N);
+  for (unsigned lane = 0; lane < arguments->N; ++lane) {
+    if (arguments->valid[lane] == 0) continue;
+    const unsigned id = RTCRayN_id(rays, arguments->N, lane);
+    Met& met = query.mets[id];
+    const bool wins_ties = std::pair(kWhat, arguments->primID) < std::pair(met.what, met.index);
+    const float limit = wins_ties ? std::nextafter(met.range_m, std::numeric_limits<float>::infinity()) : met.range_m;
+    const float range_m = intersect(thing, query.rays[id], limit);
+    if (!(range_m < limit)) continue;
+    met = {range_m, kWhat, arguments->primID};
+    RTCRayN_tfar(rays, arguments->N, lane) = range_m;
+    RTCHitN_geomID(hits, arguments->N, lane) = arguments->geomID;
+    RTCHitN_primID(hits, arguments->N, lane) = arguments->primID;
+  }
 }
 
 }  // namespace
@@ -123,27 +127,32 @@ RayScene::RayScene(const RayScene& fixed, const Solids& moving, float time_reach
 
 RayScene::~RayScene() = default;
 
-void RayScene::trace(const Ray& ray, Met& met) const {
+void RayScene::trace(std::span<const Ray> rays, Met* mets) const {
   Query query;
   rtcInitIntersectContext(&query.context);
-  query.ray = &ray;
-  query.met = &met;
-  RTCRayHit ray_hit;
-  ray_hit.ray.org_x = ray.origin.x();
-  ray_hit.ray.org_y = ray.origin.y();
-  ray_hit.ray.org_z = ray.origin.z();
-  ray_hit.ray.dir_x = ray.direction.x();
-  ray_hit.ray.dir_y = ray.direction.y();
-  ray_hit.ray.dir_z = ray.direction.z();
-  ray_hit.ray.tnear = 0.f;
-  ray_hit.ray.tfar = met.range_m;
-  ray_hit.ray.time = 0.f;
-  ray_hit.ray.mask = ~0u;
-  ray_hit.ray.id = 0;
-  ray_hit.ray.flags = 0;
-  ray_hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  ray_hit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(embree_->scene, &query.context, &ray_hit);
+  query.context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  query.rays = rays.data();
+  query.mets = mets;
+  alignas(64) int valid[kPacket] = {};
+  RTCRayHit16 packet;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    valid[i] = -1;
+    packet.ray.org_x[i] = rays[i].origin.x();
+    packet.ray.org_y[i] = rays[i].origin.y();
+    packet.ray.org_z[i] = rays[i].origin.z();
+    packet.ray.dir_x[i] = rays[i].direction.x();
+    packet.ray.dir_y[i] = rays[i].direction.y();
+    packet.ray.dir_z[i] = rays[i].direction.z();
+    packet.ray.tnear[i] = 0.f;
+    packet.ray.tfar[i] = mets[i].range_m;
+    packet.ray.time[i] = 0.f;
+    packet.ray.mask[i] = ~0u;
+    packet.ray.id[i] = static_cast<unsigned>(i);
+    packet.ray.flags[i] = 0;
+    packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+    packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+  }
+  rtcIntersect16(valid, embree_->scene, &query.context, &packet);
 }
 
 }  // namespace revisit::simulation_internal

@@ -2,6 +2,7 @@
 #include <revisit/simulation/internal/scanner.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <oneapi/tbb/parallel_for.h>
@@ -10,6 +11,7 @@
 namespace revisit::simulation_internal {
 namespace {
 
+constexpr double kFalloffStep_m = 0.25;
 constexpr std::size_t kPoseKnots = 51;  // poses within a sweep, linear between them
 
 // A number of its own for each cell of space: what a surface looks like there, at every visit.
@@ -42,6 +44,8 @@ Scanner::Scanner(const World& world, SensorModel sensor, const Options& options)
       options_(options),
       scene_(world.solids, world.terrain.cells(), options.embree_options) {
   const std::size_t lines = std::max<std::size_t>(1, sensor_.elevations_deg.size());
+  for (double range_m = 0.0; range_m <= sensor_.max_range_m + 2 * kFalloffStep_m; range_m += kFalloffStep_m)
+    falloff_.push_back(range_m > sensor_.focus_m ? std::pow(sensor_.focus_m / range_m, sensor_.falloff) : 1.0);
   for (std::size_t i = 0; i < lines; ++i) {
     const double elevation = sensor_.rotates() ? to_radians(sensor_.elevations_deg[i]) : 0.0;
     cos_elevation_.push_back(static_cast<float>(std::cos(elevation)));
@@ -50,6 +54,12 @@ Scanner::Scanner(const World& world, SensorModel sensor, const Options& options)
     gain_.push_back(std::max(0.3f, 1.f + static_cast<float>(sensor_.gain_spread) * gaussian(mix(world.seed, 51, i))));
     bias_m_.push_back(static_cast<float>(sensor_.line_bias_m) * gaussian(mix(world.seed, 52, i)));
   }
+}
+
+double Scanner::falloff_at(double range_m) const {
+  const double position = range_m / kFalloffStep_m;
+  const auto i = std::min(static_cast<std::size_t>(position), falloff_.size() - 2);
+  return falloff_[i] + (position - static_cast<double>(i)) * (falloff_[i + 1] - falloff_[i]);
 }
 
 Pose Scanner::T_world_lidar(double time_s) const {
@@ -97,19 +107,13 @@ Eigen::Vector3f Scanner::direction(const Sweep& sweep, std::size_t line, std::si
       .cast<float>();
 }
 
-// What the neighbouring beam has met is tried first: mostly it is met again, and the search need not look behind it.
-Met Scanner::meet(const Sweep& sweep, const Ray& ray, const Met& neighbour) const {
-  Met met;
-  const auto try_again = [&](float range_m) {
-    if (std::isfinite(range_m)) met = {range_m, neighbour.what, neighbour.index};
-  };
-  const float reach_m = static_cast<float>(sensor_.max_range_m);
-  if (neighbour.what == Met::What::kSolid) try_again(intersect(world_.solids[neighbour.index], ray, reach_m));
-  if (neighbour.what == Met::What::kGround) try_again(intersect(world_.terrain.cells()[neighbour.index], ray, reach_m));
-  if (met.what == Met::What::kNothing) met.range_m = reach_m;
-  scene_.trace(ray, met);
-  if (sweep.scene) sweep.scene->trace(ray, met);
-  return met;
+// What a neighbouring beam has met is tried first: mostly it is met again, and the search need not look behind it.
+Met Scanner::expect(const Ray& ray, const Met& neighbour) const {
+  const auto reach_m = static_cast<float>(sensor_.max_range_m);
+  float range_m = std::numeric_limits<float>::infinity();
+  if (neighbour.what == Met::What::kSolid) range_m = intersect(world_.solids[neighbour.index], ray, reach_m);
+  if (neighbour.what == Met::What::kGround) range_m = intersect(world_.terrain.cells()[neighbour.index], ray, reach_m);
+  return range_m < reach_m ? Met{range_m, neighbour.what, neighbour.index} : Met{reach_m, Met::What::kNothing, 0};
 }
 
 Hit Scanner::look_at(const Sweep& sweep, const Ray& ray, const Met& met) const {
@@ -150,7 +154,8 @@ Scanner::Return Scanner::measure(const Ray& ray, const Met& met, const Hit& hit,
   float range_m = hit.range_m;
   if (surface.roughness_m > 0.f && met.what != Met::What::kMoving)
     range_m += surface.roughness_m * (2.f * texture(p, 7.f) - 1.f) / std::max(0.3f, facing);
-  const float gloss = surface.gloss > 0.f ? surface.gloss * std::pow(facing, 16.f) : 0.f;
+  const float facing2 = facing * facing, facing4 = facing2 * facing2, facing8 = facing4 * facing4;
+  const float gloss = surface.gloss * facing8 * facing8;  // what comes straight back from a mirror
   const float response = (1.f - surface.gloss) * (1.f - surface.flatness * (1.f - facing)) + gloss;
   float strength = surface.reflectance * response * (1.f + surface.spread * (2.f * uniform(hit.object) - 1.f));
   if (met.what != Met::What::kMoving) strength *= 0.88f + 0.24f * texture(p, 2.f);
@@ -164,15 +169,15 @@ Scanner::Return Scanner::measure(const Ray& ray, const Met& met, const Hit& hit,
 
   const double measured_m =
       static_cast<double>(range_m + bias_m_[line] + static_cast<float>(sensor_.range_noise_m) * gaussian(mix(key, 2)));
-  const double stepped_m = sensor_.range_step_m * std::round(measured_m / sensor_.range_step_m);
+  const double stepped_m = sensor_.range_step_m * floor_int(measured_m / sensor_.range_step_m + 0.5);
   if (!(stepped_m >= sensor_.min_range_m && stepped_m <= sensor_.max_range_m)) return {};
 
   double reading = static_cast<double>(strength * gain_[line] *
                                        (1.f + static_cast<float>(sensor_.intensity_noise) * gaussian(mix(key, 3)))) *
                    sensor_.intensity_scale;
-  if (stepped_m > sensor_.focus_m) reading *= std::pow(sensor_.focus_m / stepped_m, sensor_.falloff);
+  reading *= falloff_at(stepped_m);
   reading =
-      std::clamp(sensor_.intensity_step * std::round(reading / sensor_.intensity_step), 0.0, sensor_.intensity_max);
+      std::clamp(sensor_.intensity_step * floor_int(reading / sensor_.intensity_step + 0.5), 0.0, sensor_.intensity_max);
   Return result;
   result.is_there = true;
   result.point = {static_cast<float>(stepped_m), 0.f, 0.f, static_cast<float>(reading)};
@@ -181,23 +186,34 @@ Scanner::Return Scanner::measure(const Ray& ray, const Met& met, const Hit& hit,
 
 void Scanner::cast(const Sweep& sweep, std::size_t first, std::size_t count, Return* returns) const {
   Met neighbour;
-  for (std::size_t beam = first; beam < first + count; ++beam) {
-    const auto columns = static_cast<std::size_t>(sensor_.columns);
-    const std::size_t line = beam / columns, column = beam % columns;
-    const Eigen::Vector3f in_lidar = direction(sweep, line, column);
-    const auto& T = sweep.T_world_lidar[sweep.T_world_lidar.size() == 1 ? 0 : column];
-    const Ray ray{T.col(3), T.leftCols<3>() * in_lidar,
-                  options_.motion_distortion ? sweep.offset_s(column, sensor_) : 0.f};
-    const Met met = meet(sweep, ray, neighbour);
-    neighbour = met;
-    Return& result = returns[beam - first];
-    result.is_there = false;
-    if (met.what == Met::What::kNothing) continue;
-    result = measure(ray, met, look_at(sweep, ray, met), line, mix(sweep.key, beam));
-    const float range_m = result.point.x;
-    result.point.x = range_m * in_lidar.x();
-    result.point.y = range_m * in_lidar.y();
-    result.point.z = range_m * in_lidar.z();
+  std::array<Ray, RayScene::kPacket> rays;
+  std::array<Met, RayScene::kPacket> mets;
+  const auto columns = static_cast<std::size_t>(sensor_.columns);
+  for (std::size_t packet = first; packet < first + count; packet += rays.size()) {
+    const std::size_t size = std::min(rays.size(), first + count - packet);
+    std::array<Eigen::Vector3f, RayScene::kPacket> in_lidar;
+    for (std::size_t i = 0; i < size; ++i) {
+      const std::size_t line = (packet + i) / columns, column = (packet + i) % columns;
+      in_lidar[i] = direction(sweep, line, column);
+      const auto& T = sweep.T_world_lidar[sweep.T_world_lidar.size() == 1 ? 0 : column];
+      rays[i] = {T.col(3), T.leftCols<3>() * in_lidar[i],
+                 options_.motion_distortion ? sweep.offset_s(column, sensor_) : 0.f};
+      mets[i] = expect(rays[i], neighbour);
+    }
+    scene_.trace(std::span(rays).first(size), mets.data());
+    if (sweep.scene) sweep.scene->trace(std::span(rays).first(size), mets.data());
+    neighbour = mets[size - 1];
+    for (std::size_t i = 0; i < size; ++i) {
+      Return& result = returns[packet + i - first];
+      result.is_there = false;
+      if (mets[i].what == Met::What::kNothing) continue;
+      const std::size_t beam = packet + i;
+      result = measure(rays[i], mets[i], look_at(sweep, rays[i], mets[i]), beam / columns, mix(sweep.key, beam));
+      const float range_m = result.point.x;
+      result.point.x = range_m * in_lidar[i].x();
+      result.point.y = range_m * in_lidar[i].y();
+      result.point.z = range_m * in_lidar[i].z();
+    }
   }
 }
 
@@ -247,6 +263,11 @@ Scan Scanner::sweep(std::int64_t frame, double time_s) const {
   Scan scan;
   scan.frame = FrameId{frame};
   scan.stamp_s = time_s;
+  const auto count = static_cast<std::size_t>(
+      std::count_if(returns.begin(), returns.end(), [](const Return& r) { return r.is_there; }));
+  scan.points.reserve(count);
+  if (sensor_.rotates()) scan.rings.reserve(count);
+  if (options_.motion_distortion) scan.times_s.reserve(count);
   for (std::size_t beam = 0; beam < returns.size(); ++beam) {
     if (!returns[beam].is_there) continue;
     scan.points.push_back(returns[beam].point);

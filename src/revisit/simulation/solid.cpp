@@ -54,11 +54,22 @@ struct Span {
 
 Span clip_to_box(const LocalRay& ray, const Vector3f& half) {
   Span span;
-  for (int axis = 0; axis < 3 && !span.empty(); ++axis) {
-    const Vector3f unit = Vector3f::Unit(axis);
-    span.clip(ray.origin[axis] - half[axis], ray.direction[axis], unit);
-    span.clip(-ray.origin[axis] - half[axis], -ray.direction[axis], -unit);
+  int entered = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const float o = ray.origin[axis], d = ray.direction[axis], h = half[axis];
+    if (d == 0.f) {
+      if (std::abs(o) > h) span.leave = -1.f;
+      continue;
+    }
+    const float inverse = 1.f / d, middle = -o * inverse, reach = std::abs(h * inverse);
+    if (middle - reach > span.enter) {
+      span.enter = middle - reach;
+      entered = axis + 1;
+    }
+    span.leave = std::min(span.leave, middle + reach);
+    if (span.empty()) return span;
   }
+  if (entered != 0) span.normal[entered - 1] = ray.direction[entered - 1] > 0.f ? -1.f : 1.f;
   return span;
 }
 

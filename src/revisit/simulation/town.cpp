@@ -286,7 +286,7 @@ void add_traffic(World& world, double traffic) {
 District district_at(const World& world, double x, double y) {
   constexpr double kStretch_m = 55.0;
   for (const Eigen::Vector2d& middle : world.featureless)
-    if (std::hypot(x - middle.x(), y - middle.y()) < kStretch_m) return District::kFeatureless;
+    if ((Eigen::Vector2d(x, y) - middle).squaredNorm() < kStretch_m * kStretch_m) return District::kFeatureless;
   constexpr double kBlock_m = 115.0;
   const auto block = mix(mix(world.seed, 21), static_cast<std::uint64_t>(floor_int(x / kBlock_m) + 10000),
                          static_cast<std::uint64_t>(floor_int(y / kBlock_m) + 10000));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,8 +33,12 @@ class RayScene {
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
 
-  /// Betters `met`, which may hold what another scene or the neighbouring beam has found. Safe from several threads.
-  void trace(const Ray& ray, Met& met) const;
+  /// Neighbouring beams are traced together.
+  static constexpr std::size_t kPacket = 16;
+
+  /// Betters `mets`, one a ray, which may hold what another scene or a neighbouring beam has found. At most kPacket rays.
+  /// Safe from several threads.
+  void trace(std::span<const Ray> rays, Met* mets) const;
 
  private:
   struct Embree;

@@ -35,7 +35,7 @@ class Roads {
   float x_min_ = 0.f, y_min_ = 0.f;
   int columns_ = 0, rows_ = 0;
   std::vector<std::uint32_t> first_;  ///< of each cell in `near_`
-  std::vector<std::uint32_t> near_;   ///< points near each cell
+  std::vector<LanePoint> near_;       ///< the points that can be nearest to a place in the cell
 };
 
 }  // namespace revisit::simulation_internal

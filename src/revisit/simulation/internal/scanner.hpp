@@ -39,13 +39,15 @@ class Scanner {
   void cast(const Sweep& sweep, std::size_t first, std::size_t count, Return* returns) const;
   Return measure(const Ray& ray, const Met& met, const Hit& hit, std::size_t line, std::uint64_t key) const;
   Hit look_at(const Sweep& sweep, const Ray& ray, const Met& met) const;
-  Met meet(const Sweep& sweep, const Ray& ray, const Met& neighbour) const;
+  double falloff_at(double range_m) const;
+  Met expect(const Ray& ray, const Met& neighbour) const;
 
   const World& world_;
   SensorModel sensor_;
   Options options_;
   RayScene scene_;
   std::vector<float> cos_elevation_, sin_elevation_, gain_, bias_m_;
+  std::vector<double> falloff_;  ///< of readings with distance, a value each 0.25 m
 };
 
 }  // namespace revisit::simulation_internal
