@@ -179,7 +179,9 @@ Run add_detect(CLI::App& program) {
       "  poses.txt/.tum  the poses that came with the recording, if any, and the calib.txt that poses.txt needs\n"
       "  run.json        version, parameters, counts, milliseconds a stage\n\n"
       "Example: revisit detect kitti/sequences/00 --out results/00");
-  command->add_option("input", options->input, "Recording: KITTI folder, KITTI raw drive, folder of scans, or .toml of a simulated drive")
+  command
+      ->add_option("input", options->input,
+                   "Recording: KITTI folder, KITTI raw drive, folder of scans, or .toml of a simulated drive")
       ->required();
   command->add_option("--out", options->out, "Folder for the results")->required();
   command->add_option("--database", options->database,

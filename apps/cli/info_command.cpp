@@ -9,9 +9,15 @@
 
 #include "common.hpp"
 #include "sensor_guess.hpp"
+#include "statistics.hpp"
 
 namespace revisit::cli {
 namespace {
+
+struct Options {
+  std::string input, beside, picture;
+  ParameterFlags parameters;
+};
 
 void print_scan_facts(const Scan& scan, const IntensityScale& scale) {
   const Rings rings = find_rings(scan);
@@ -42,7 +48,33 @@ int info_of_file(const std::string& file, const Parameters& parameters) {
   return scale.is_reflectance ? kDone : kDoneWithReservations;
 }
 
-int info_of_recording(const std::string& folder, const Parameters& parameters) {
+std::string short_name(const std::string& input) {
+  const std::filesystem::path path = std::filesystem::path(input).lexically_normal();
+  return path.has_filename() ? path.filename().string() : path.parent_path().filename().string();
+}
+
+// How its scans look on average, and those of another recording beside them.
+int compare(const Recording& recording, const Options& options, const Parameters& parameters) {
+  std::vector<RecordingStatistics> all;
+  const auto own = collect_statistics(recording, short_name(options.input), parameters);
+  if (!own) return fail(own.error());
+  all.push_back(*own);
+  if (!options.beside.empty()) {
+    const auto opened = open_input(options.beside);
+    if (!opened) return fail(opened.error());
+    const auto other = collect_statistics(**opened, short_name(options.beside), parameters);
+    if (!other) return fail(other.error());
+    all.push_back(*other);
+  }
+  print_statistics(all);
+  if (options.picture.empty()) return kDone;
+  if (const Status status = draw_statistics(options.picture, all); !status) return fail(status.error());
+  std::printf("%s\n", options.picture.c_str());
+  return kDone;
+}
+
+int info_of_recording(const Options& options, const Parameters& parameters) {
+  const std::string& folder = options.input;
   const auto opened = open_input(folder);
   if (!opened) return fail(opened.error());
   const Recording& recording = **opened;
@@ -74,27 +106,34 @@ int info_of_recording(const std::string& folder, const Parameters& parameters) {
   const auto scale = estimate_intensity_scale(recording, parameters);
   if (!scale) return fail(scale.error());
   print_scan_facts(*first, *scale);
+  if (!options.picture.empty() || !options.beside.empty())
+    if (const int code = compare(recording, options, parameters); code != kDone) return code;
   return broken == 0 && scale->is_reflectance ? kDone : kDoneWithReservations;
 }
 
 }  // namespace
 
 Run add_info(CLI::App& program) {
-  struct Options {
-    std::string input;
-    ParameterFlags parameters;
-  };
   auto options = std::make_shared<Options>();
   CLI::App* command = program.add_subcommand(
       "info", "Tell what a recording or a single scan file holds: sensor, rings, rate, intensity, poses.");
-  command->footer("Example: revisit info kitti/sequences/00; revisit info cloud.pcd");
+  command->footer(
+      "Example: revisit info kitti/sequences/00; revisit info cloud.pcd\n"
+      "         revisit info drive --beside kitti/sequences/00 --picture statistics.png");
   command->add_option("input", options->input, "Recording or scan file")->required();
-  options->parameters.add_to(*command, {"intensity"});
+  command->add_option("--picture", options->picture, "Draw how the scans look on average into this .png");
+  command->add_option("--beside", options->beside, "Another recording to compare with");
+  options->parameters.add_to(*command, {"preprocess", "intensity", "descriptor"});
   return [options]() -> int {
     const auto parameters = options->parameters.resolve();
     if (!parameters) return fail(parameters.error(), kUsage);
-    return std::filesystem::is_directory(options->input) || std::filesystem::path(options->input).extension() == ".toml" ? info_of_recording(options->input, *parameters)
-                                                         : info_of_file(options->input, *parameters);
+    if (!options->picture.empty())
+      if (const Status status = check_output(options->picture, ".png"); !status) return fail(status.error(), kUsage);
+    const bool is_recording =
+        std::filesystem::is_directory(options->input) || std::filesystem::path(options->input).extension() == ".toml";
+    if (!is_recording && !(options->picture.empty() && options->beside.empty()))
+      return fail({options->input + ": --picture and --beside need a recording, not a single scan"}, kUsage);
+    return is_recording ? info_of_recording(*options, *parameters) : info_of_file(options->input, *parameters);
   };
 }
 

@@ -13,7 +13,8 @@ int main(int argc, char** argv) {
       "  revisit info RECORDING                     what is in there\n"
       "  revisit detect RECORDING --out results     find the loops\n"
       "  revisit evaluate results --reference POSES score them, draw them\n\n"
-      "RECORDING is a KITTI odometry folder, a KITTI raw drive, a folder of .bin, .pcd or .ply scans, or the .toml of a\n"
+      "RECORDING is a KITTI odometry folder, a KITTI raw drive, a folder of .bin, .pcd or .ply scans, or the .toml of "
+      "a\n"
       "simulated drive. Without any: revisit simulate --out RECORDING.\n"
       "Exit code: 0 done, 1 failed, 2 wrong usage, 3 done but with scans skipped or without usable intensity,\n"
       "130 interrupted (what was computed until then is written).",
@@ -24,7 +25,8 @@ int main(int argc, char** argv) {
 
   program_arguments().assign(argv + 1, argv + argc);
   std::vector<std::pair<CLI::App*, Run>> commands;
-  for (const auto add : {add_info, add_describe, add_detect, add_evaluate, add_calibrate, add_simulate, add_parameters}) {
+  for (const auto add :
+       {add_info, add_describe, add_detect, add_evaluate, add_calibrate, add_simulate, add_parameters}) {
     Run run = add(program);
     commands.emplace_back(program.get_subcommands({}).back(), std::move(run));
   }

@@ -20,7 +20,8 @@ Status write_run(const std::filesystem::path& file, const RunFile& run) {
   for (const ParameterInfo& info : parameter_infos()) {
     const std::string value = get_parameter(run.parameters, info.name);
     if (info.name.starts_with("simulation.") && !is_simulated) continue;
-    document["parameters"][info.name] = info.is_text ? nlohmann::ordered_json(value) : nlohmann::ordered_json::parse(value);
+    document["parameters"][info.name] =
+        info.is_text ? nlohmann::ordered_json(value) : nlohmann::ordered_json::parse(value);
   }
   document["intensity"] = {{"min", run.intensity.min_raw},
                            {"median", run.intensity.median_raw},

@@ -45,7 +45,8 @@ int run_simulation(const Options& options) {
 
 Run add_simulate(CLI::App& program) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = program.add_subcommand("simulate", "Drive a LiDAR through a town or a warehouse, with exact truth.");
+  CLI::App* command =
+      program.add_subcommand("simulate", "Drive a LiDAR through a town or a warehouse, with exact truth.");
   command->footer(
       "Writes a KITTI odometry folder (formats: docs/formats.md):\n"
       "  velodyne/           the scans; beside it velodyne_times/ and velodyne_rings/, one value a point\n"

@@ -101,7 +101,9 @@ Eigen::Vector3f Scanner::direction(const Sweep& sweep, std::size_t line, std::si
   const double time_s = sweep.time_s + static_cast<double>(sweep.offset_s(column, sensor_)) + sensor_.sweep_s;
   const double a = 2 * kPi * 121.567 * time_s, b = -2 * kPi * 77.731 * time_s;
   const double half = 0.5 * to_radians(sensor_.rosette_half_angle_deg);
-  const double azimuth = half * (std::cos(a) + std::cos(b)), elevation = half * (std::sin(a) + std::sin(b));
+  // Six lasers side by side take turns.
+  const double beside = to_radians(1.1) * (static_cast<double>(column % 6) - 2.5);
+  const double azimuth = half * (std::cos(a) + std::cos(b)) + beside, elevation = half * (std::sin(a) + std::sin(b));
   return Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
                          std::sin(elevation))
       .cast<float>();
