@@ -108,8 +108,7 @@ struct RayScene::Embree {
 };
 
 RayScene::RayScene(const Solids& solids, const std::vector<Terrain::Cell>& ground, const std::string& embree_options)
-    : embree_(std::make_unique<Embree>(
-          rtcNewDevice(embree_options.c_str()))) {
+    : embree_(std::make_unique<Embree>(rtcNewDevice(embree_options.c_str()))) {
   embree_->solids.list = solids.data();
   embree_->cells.list = ground.data();
   embree_->attach<Solid, Met::What::kSolid>(embree_->solids, solids.size(), solid_bounds);

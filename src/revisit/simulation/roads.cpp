@@ -58,7 +58,8 @@ Roads::Roads(const std::vector<std::vector<Knot>>& lanes, const Terrain& grid)
   const auto for_each_near = [this](auto visit) {
     constexpr int kReach = static_cast<int>(kReach_m / kCell_m) + 1;
     for (std::uint32_t i = 0; i < points_.size(); ++i) {
-      const int column = floor_int((points_[i].x - x_min_) / kCell_m), row = floor_int((points_[i].y - y_min_) / kCell_m);
+      const int column = floor_int((points_[i].x - x_min_) / kCell_m),
+                row = floor_int((points_[i].y - y_min_) / kCell_m);
       for (int r = std::max(0, row - kReach); r <= std::min(rows_ - 1, row + kReach); ++r)
         for (int c = std::max(0, column - kReach); c <= std::min(columns_ - 1, column + kReach); ++c) {
           const float dx = x_min_ + (static_cast<float>(c) + 0.5f) * kCell_m - points_[i].x;
@@ -72,7 +73,8 @@ Roads::Roads(const std::vector<std::vector<Knot>>& lanes, const Terrain& grid)
   // diagonal farther away than the nearest one.
   std::vector<float> least(first_.size(), kReach_m + kCell_m);
   const auto is_kept = [&](std::size_t cell, float distance) { return distance <= least[cell] + 1.4143f * kCell_m; };
-  for_each_near([&](std::size_t cell, std::uint32_t, float distance) { least[cell] = std::min(least[cell], distance); });
+  for_each_near(
+      [&](std::size_t cell, std::uint32_t, float distance) { least[cell] = std::min(least[cell], distance); });
   for_each_near([&](std::size_t cell, std::uint32_t, float distance) { first_[cell + 1] += is_kept(cell, distance); });
   for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
   near_.resize(first_.back());

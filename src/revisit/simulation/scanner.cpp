@@ -89,7 +89,7 @@ Pose Scanner::T_world_lidar(double time_s) const {
     T.rotate(Eigen::AngleAxisd(tilt.norm(),
                                tilt.norm() > 0 ? Eigen::Vector3d(tilt.normalized()) : Eigen::Vector3d::UnitX()));
   }
-  T.translate(Eigen::Vector3d(0, 0, world_.sensor_height_m));
+  T.translate(Eigen::Vector3d(0, 0, world_.vehicle.roof_m + sensor_.mast_m));
   return T;
 }
 
@@ -178,12 +178,21 @@ Scanner::Return Scanner::measure(const Ray& ray, const Met& met, const Hit& hit,
                                        (1.f + static_cast<float>(sensor_.intensity_noise) * gaussian(mix(key, 3)))) *
                    sensor_.intensity_scale;
   reading *= falloff_at(stepped_m);
-  reading =
-      std::clamp(sensor_.intensity_step * floor_int(reading / sensor_.intensity_step + 0.5), 0.0, sensor_.intensity_max);
+  if (chance > 1.f - static_cast<float>(sensor_.dark)) reading = 0.0;
+  reading = std::clamp(sensor_.intensity_step * floor_int(reading / sensor_.intensity_step + 0.5), 0.0,
+                       sensor_.intensity_max);
   Return result;
   result.is_there = true;
   result.point = {static_cast<float>(stepped_m), 0.f, 0.f, static_cast<float>(reading)};
   return result;
+}
+
+// Beams that look down on the vehicle itself come back from too near. A sensor carried by hand has no roof below it.
+bool Scanner::meets_own_roof(const Eigen::Vector3f& direction) const {
+  if (direction.z() >= 0.f || options_.tilt_deg > 0.0) return false;
+  const float reach = static_cast<float>(sensor_.mast_m) / -direction.z();
+  return std::abs(reach * direction.x()) < static_cast<float>(world_.vehicle.half_length_m) &&
+         std::abs(reach * direction.y()) < static_cast<float>(world_.vehicle.half_width_m);
 }
 
 void Scanner::cast(const Sweep& sweep, std::size_t first, std::size_t count, Return* returns) const {
@@ -208,7 +217,7 @@ void Scanner::cast(const Sweep& sweep, std::size_t first, std::size_t count, Ret
     for (std::size_t i = 0; i < size; ++i) {
       Return& result = returns[packet + i - first];
       result.is_there = false;
-      if (mets[i].what == Met::What::kNothing) continue;
+      if (mets[i].what == Met::What::kNothing || meets_own_roof(in_lidar[i])) continue;
       const std::size_t beam = packet + i;
       result = measure(rays[i], mets[i], look_at(sweep, rays[i], mets[i]), beam / columns, mix(sweep.key, beam));
       const float range_m = result.point.x;

@@ -31,8 +31,10 @@ std::vector<SensorModel> make_table() {
   hdl64.line_bias_m = 0.008;
   hdl64.visible_10_percent_m = 50.0;
   hdl64.drop_out = 0.02;
-  hdl64.gain_spread = 0.08;
+  hdl64.gain_spread = 0.15;
   hdl64.falloff = 0.35;
+  hdl64.intensity_noise = 0.12;
+  hdl64.dark = 0.09;
   hdl64.intensity_max = 0.99;
 
   SensorModel vlp16;
@@ -55,6 +57,7 @@ std::vector<SensorModel> make_table() {
   os0.title = "Ouster OS0-128, 360 x 90 degrees";
   os0.elevations_deg = lines(128, 45.0, -45.0);
   os0.columns = 1024;
+  os0.mast_m = 1.0;
   os0.max_range_m = 75.0;
   os0.min_range_m = 0.4;
   os0.range_noise_m = 0.012;

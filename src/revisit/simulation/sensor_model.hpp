@@ -20,6 +20,7 @@ struct SensorModel {
   int columns = 0;                     ///< beams of a line in one turn; all beams of a rosette
   double rosette_half_angle_deg = 0.0;
 
+  double mast_m = 0.3;  ///< from the vehicle's roof up to the sensor
   double min_range_m = 0.5, max_range_m = 120.0;
   double range_noise_m = 0.01;       ///< standard deviation of a beam
   double line_bias_m = 0.0;          ///< standard deviation of what each line is always off by
@@ -33,6 +34,7 @@ struct SensorModel {
   double falloff = 0.5;           ///< ... with distance to this power
   double intensity_scale = 1.0;   ///< reading of a white target
   double intensity_step = 0.01;   ///< readings are whole multiples
+  double dark = 0.0;                 ///< share of the readings that are 0
   double intensity_max = 1.0;     ///< larger readings saturate
 
   bool rotates() const { return !elevations_deg.empty(); }

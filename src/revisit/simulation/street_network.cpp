@@ -71,7 +71,7 @@ Eigen::Vector2d meet(const Eigen::Vector2d& p, const Eigen::Vector2d& d, const E
 }  // namespace
 
 StreetDrive drive_through_streets(double length_m, std::uint64_t seed) {
-  constexpr double kLane_m = 1.75;
+  constexpr double kLane_m = 1.45;
   const std::vector<Junction> way = junctions_of_drive(length_m, seed);
   Random random(mix(seed, 7));
   std::vector<Eigen::Vector2d> middle, direction, corners;
@@ -79,7 +79,7 @@ StreetDrive drive_through_streets(double length_m, std::uint64_t seed) {
   for (const Junction& junction : way) middle.push_back(position(junction, seed));
   for (std::size_t i = 0; i + 1 < way.size(); ++i) {
     direction.push_back((middle[i + 1] - middle[i]).normalized());
-    right_m.push_back(random.chance(0.25) ? kLane_m + 1.75 : kLane_m);  // now and then half a lane farther out
+    right_m.push_back(random.chance(0.25) ? kLane_m + 1.5 : kLane_m);  // now and then half a lane farther out
   }
   const auto lane_start = [&](std::size_t i) -> Eigen::Vector2d {
     return middle[i] - right_m[i] * left_of(direction[i]);

@@ -71,12 +71,12 @@ class TownBuilder {
     if (is_due(p, next_m[0])) {
       next_m[0] = arc_m + 6.3;
       const auto r = rectangle(p, edge(side) - side * 1.0, 0.95, 2.6);
-      const bool has_slots = district == District::kPark ? random.chance(0.15) : random.chance(0.7);
+      const bool has_slots = district == District::kPark ? random.chance(0.15) : random.chance(0.85);
       if (has_slots && taken_.take_if_free(r)) {
         Stand at = stand(r, side);
         at.x += random.uniform(-0.15, 0.15);
         at.yaw_rad += random.uniform(-0.03, 0.03) + (random.chance(0.1) ? kPi : 0.0);
-        world_.movers.slots.push_back({at, random.next(), random.uniform(0.3, 0.9), {}});
+        world_.movers.slots.push_back({at, random.next(), random.uniform(0.4, 0.95), {}});
       }
     }
     if (is_due(p, next_m[1])) {
@@ -138,7 +138,7 @@ class TownBuilder {
 
   void row_house(const LanePoint& p, int side, Random& random, double& next_m) {
     const double width = random.uniform(6.5, 12.0), depth = random.uniform(9.0, 13.0),
-                 setback = random.uniform(2.2, 3.4);
+                 setback = random.uniform(1.7, 2.6);
     const auto r =
         rectangle(p, edge(side) + side * (setback + 0.5 * depth), 0.5 * depth - 0.3, 0.5 * width - 0.3, 0.5 * width);
     if (!taken_.take_if_free(r)) return;
@@ -154,7 +154,7 @@ class TownBuilder {
 
   void detached_house(const LanePoint& p, int side, Random& random, double& next_m) {
     const double width = random.uniform(8.0, 14.0), depth = random.uniform(8.0, 12.0),
-                 setback = random.uniform(5.5, 11.0);
+                 setback = random.uniform(4.5, 9.0);
     const double plot = width + random.uniform(5.0, 14.0);
     const auto r = rectangle(p, edge(side) + side * (setback + 0.5 * depth), 0.5 * depth, 0.5 * width, 0.5 * plot);
     if (!taken_.take_if_free(r)) return;
@@ -165,7 +165,7 @@ class TownBuilder {
               {std::min(width, depth), std::min(width, depth), random.uniform(2.9, 6.2), random.uniform(2.5, 4.5),
                random.whole(1, 3), walls(random)},
               random.next());
-    barrier(p, side, edge(side) + side * 2.3, 0.0, plot - 3.0, random);
+    barrier(p, side, edge(side) + side * 1.9, 0.0, plot - 3.0, random);
     for (int i = random.whole(0, 3); i > 0; --i) {
       const auto garden =
           rectangle(p, edge(side) + side * random.uniform(3.2, 7.0), 0.5, 0.5, random.uniform(0.0, plot));
@@ -179,16 +179,17 @@ class TownBuilder {
 
   // A fence, hedge or wall beside the lane, in pieces that follow the ground.
   void barrier(const LanePoint& p, int side, double left_m, double from_m, double to_m, Random& random) {
-    const int kind = random.whole(0, 3);
+    const int kind = random.whole(0, 4);
     const double height = random.uniform(0.8, 1.9);
     const std::uint64_t seed = random.next();
     constexpr double kPiece_m = 3.0;
-    for (double at_m = from_m; at_m + kPiece_m <= to_m && kind < 3; at_m += kPiece_m) {
+    for (double at_m = from_m; at_m + kPiece_m <= to_m && kind < 4; at_m += kPiece_m) {
       const auto r = rectangle(p, left_m, 0.2, 0.45 * kPiece_m, at_m + 0.5 * kPiece_m);
       if (!taken_.take_if_free(r)) continue;
       const Stand at = stand(r, side);
       if (kind == 0) add_fence(world_.solids, at, kPiece_m, height, seed);
-      if (kind == 1) add_hedge(world_.solids, at, kPiece_m, height, mix(seed, static_cast<std::uint64_t>(at_m)));
+      if (kind == 1 || kind == 3)
+        add_hedge(world_.solids, at, kPiece_m, height, mix(seed, static_cast<std::uint64_t>(at_m)));
       if (kind == 2) add_box(world_.solids, at, kPiece_m, 0.24, -1.0, height, Material::kConcrete, seed);
     }
   }
@@ -264,7 +265,7 @@ void add_traffic(World& world, double traffic) {
     if (kind < 0.35) {  // oncoming: they meet at time_s
       mover.vehicle = vehicle();
       mover.speed_mps = -random.uniform(6.0, 12.0);
-      mover.left_m = 3.4;
+      mover.left_m = 2.9;
       mover.arc_m = arc_m + 15.0 * -mover.speed_mps;
     } else if (kind < 0.5) {
       mover.way = Mover::Way::kAhead;
@@ -273,8 +274,8 @@ void add_traffic(World& world, double traffic) {
     } else {
       mover.is_person = true;
       mover.speed_mps = random.uniform(0.9, 1.7) * (random.chance(0.5) ? 1.0 : -1.0);
-      mover.left_m = random.chance(0.6) ? static_cast<double>(Roads::kRightEdge_m) - random.uniform(0.9, 1.7)
-                                        : static_cast<double>(Roads::kLeftEdge_m) + random.uniform(0.9, 1.7);
+      mover.left_m = random.chance(0.6) ? static_cast<double>(Roads::kRightEdge_m) - random.uniform(0.7, 1.3)
+                                        : static_cast<double>(Roads::kLeftEdge_m) + random.uniform(0.7, 1.3);
       mover.arc_m = arc_m + random.uniform(-20.0, 40.0) - 15.0 * mover.speed_mps;
     }
     world.movers.movers.push_back(mover);
@@ -319,8 +320,8 @@ Ground World::ground_at(float x, float y) const {
   const float dash = place->arc_m / 9.f;
   const bool on_dash = dash - static_cast<float>(floor_int(dash)) < 0.4f;
   const bool is_marking = (std::abs(left - Roads::kCentreLine_m) < 0.07f && on_dash) ||
-                          std::abs(left - Roads::kRightEdge_m - 2.1f) < 0.06f ||
-                          std::abs(left - Roads::kLeftEdge_m + 2.1f) < 0.06f;
+                          std::abs(left - Roads::kRightEdge_m - 2.0f) < 0.06f ||
+                          std::abs(left - Roads::kLeftEdge_m + 2.0f) < 0.06f;
   return {is_marking ? Material::kMarking : Material::kAsphalt, 0.f};
 }
 
@@ -344,7 +345,7 @@ Result<World> build_town(const SimulationOptions& options, const LogSink& log) {
   Terrain terrain(drive.path, kReach_m, hills_m, mix(seed, 2));
   drive.streets.insert(drive.streets.begin(), drive.path.knots());
   Roads roads(drive.streets, terrain);
-  World world{std::move(drive.path), std::move(terrain), std::move(roads), {}, {}, {}, seed, 1.73};
+  World world{std::move(drive.path), std::move(terrain), std::move(roads), {}, {}, {}, seed, {}};
   Random random(mix(seed, 3));
   for (double arc_m = 0.25 * std::min(world.path.length_m(), 1000.0); arc_m < world.path.length_m();
        arc_m += random.uniform(320.0, 700.0)) {

@@ -44,9 +44,9 @@ struct Surface {
 
 // Orders of magnitude as published for near infrared; asphalt, grass and leaves are what most points of a drive lie on.
 inline constexpr std::array<Surface, static_cast<std::size_t>(Material::kCount)> kSurfaces = {{
-    {0.17f, 0.15f, 0.00f, 0.10f, 0.003f},  // asphalt
+    {0.21f, 0.15f, 0.00f, 0.10f, 0.003f},  // asphalt
     {0.60f, 0.25f, 0.00f, 0.10f, 0.003f},  // marking
-    {0.27f, 0.20f, 0.00f, 0.15f, 0.004f},  // pavement
+    {0.30f, 0.20f, 0.00f, 0.15f, 0.004f},  // pavement
     {0.36f, 0.10f, 0.00f, 0.10f, 0.040f},  // grass
     {0.24f, 0.15f, 0.00f, 0.20f, 0.025f},  // earth
     {0.42f, 0.70f, 0.00f, 0.60f, 0.004f},  // plaster

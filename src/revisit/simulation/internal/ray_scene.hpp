@@ -36,8 +36,8 @@ class RayScene {
   /// Neighbouring beams are traced together.
   static constexpr std::size_t kPacket = 16;
 
-  /// Betters `mets`, one a ray, which may hold what another scene or a neighbouring beam has found. At most kPacket rays.
-  /// Safe from several threads.
+  /// Betters `mets`, one a ray, which may hold what another scene or a neighbouring beam has found. At most kPacket
+  /// rays. Safe from several threads.
   void trace(std::span<const Ray> rays, Met* mets) const;
 
  private:

@@ -19,7 +19,7 @@ struct LanePoint {
 class Roads {
  public:
   /// Sides of the road seen from the middle of its right lane, metres to the left.
-  static constexpr float kRightEdge_m = -4.4f, kLeftEdge_m = 7.2f, kCentreLine_m = 1.7f, kPavement_m = 2.0f;
+  static constexpr float kRightEdge_m = -3.8f, kLeftEdge_m = 5.9f, kCentreLine_m = 1.45f, kPavement_m = 1.6f;
 
   Roads() = default;
   Roads(const std::vector<std::vector<Knot>>& lanes, const Terrain& grid);

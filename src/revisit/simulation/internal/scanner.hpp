@@ -39,6 +39,7 @@ class Scanner {
   void cast(const Sweep& sweep, std::size_t first, std::size_t count, Return* returns) const;
   Return measure(const Ray& ray, const Met& met, const Hit& hit, std::size_t line, std::uint64_t key) const;
   Hit look_at(const Sweep& sweep, const Ray& ray, const Met& met) const;
+  bool meets_own_roof(const Eigen::Vector3f& direction) const;
   double falloff_at(double range_m) const;
   Met expect(const Ray& ray, const Met& neighbour) const;
 

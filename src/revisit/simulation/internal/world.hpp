@@ -17,6 +17,12 @@ struct Ground {
   float lift_m = 0.f;
 };
 
+/// What carries the sensor: a mast in the middle of a flat roof, which hides the ground beside the vehicle.
+struct Vehicle {
+  double roof_m = 1.43;  ///< above the ground
+  double half_length_m = 0.95, half_width_m = 0.45;
+};
+
 /// Everything there is, and the way through it.
 struct World {
   Path path;
@@ -26,7 +32,7 @@ struct World {
   Movers movers;
   std::vector<Eigen::Vector2d> featureless;  ///< middles of stretches without features
   std::uint64_t seed = 0;
-  double sensor_height_m = 1.73;
+  Vehicle vehicle;
 
   Ground ground_at(float x, float y) const;
 };
