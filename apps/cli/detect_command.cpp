@@ -11,6 +11,7 @@
 
 #include "common.hpp"
 #include "progress.hpp"
+#include "read_ahead.hpp"
 #include "run_file.hpp"
 
 namespace revisit::cli {
@@ -56,8 +57,9 @@ Status write_loop(ResultWriter& writer, const Detection& detection) {
 // The places of another recording, to be found again.
 Status learn_database(LoopDetector& detector, const Recording& database, RunFile& run) {
   Progress progress("learn", "scans", database.size());
+  ReadAhead scans(database);
   for (std::size_t i = 0; i < database.size() && !interrupted(); ++i) {
-    auto scan = database.read(i);
+    auto scan = scans.next();
     const Status status =
         scan ? detector.add(*std::move(scan), database.trajectory().at(database.frame(i))) : scan.error();
     if (!status) skip(run, progress, status.error());
@@ -70,9 +72,10 @@ Status learn_database(LoopDetector& detector, const Recording& database, RunFile
 
 Status detect_all(LoopDetector& detector, const Recording& recording, ResultWriter& writer, RunFile& run) {
   Progress progress("detect", "scans", recording.size());
+  ReadAhead scans(recording);
   for (std::size_t i = 0; i < recording.size() && !interrupted(); ++i) {
     Stopwatch watch;
-    auto scan = recording.read(i);
+    auto scan = scans.next();
     run.ms_total["read"] += watch.lap_ms();
     if (scan) {
       run.counts["dropped_non_finite"] += scan->dropped_non_finite;

@@ -65,6 +65,9 @@ const std::vector<Entry>& table() {
       REVISIT_REAL(geometric, min_descriptor_score, 0, 2,
                    "candidates of lower geometry plus intensity score are not registered"),
       REVISIT_SWITCH(geometric, features_first, "register from FPFH features before trying the yaw of the descriptors"),
+      REVISIT_SWITCH(
+          geometric, features_fallback,
+          "register from FPFH features where the yaw of the descriptors gave nothing that is accepted; slow"),
       REVISIT_REAL(geometric, feature_radius_m, 0.1, 50, "neighbourhood of an FPFH feature"),
       REVISIT_REAL(geometric, inlier_distance_m, 0.01, 5, "farthest point-to-plane distance of an inlier"),
       REVISIT_REAL(geometric, min_inlier_ratio, 0, 1,

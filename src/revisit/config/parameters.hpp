@@ -54,6 +54,7 @@ struct GeometricOptions {
   int candidates = 3;                 ///< how many of the top-K are registered, best first
   double min_descriptor_score = 1.0;  ///< candidates with a lower Phi_g + Phi_i are not registered
   bool features_first = false;        ///< start from FPFH, as the paper does, before trying the descriptors' yaw
+  bool features_fallback = false;     ///< try FPFH where the descriptors' yaw gave no accepted registration; slow
   double feature_radius_m = 3.0;      ///< neighbourhood of FPFH features
   double inlier_distance_m = 0.4;     ///< farthest point-to-plane distance of an inlier
   double min_inlier_ratio = 0.6;      ///< share of the points above ground, both ways, that must be inliers

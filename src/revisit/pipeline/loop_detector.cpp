@@ -6,6 +6,8 @@
 #include <numeric>
 #include <stdexcept>
 
+#include <oneapi/tbb/parallel_for.h>
+
 namespace revisit {
 
 CandidateRow Detection::row() const {
@@ -107,43 +109,57 @@ void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
     return found == recent_queries_.end() ? nullptr : &found->second;
   };
   const auto match_descriptor = [&](FrameId frame) { return index_.find(frame); };
-  std::optional<ScanGeometry> query;
   const auto count = std::min(detection.candidates.size(), static_cast<std::size_t>(parameters_.geometric.candidates));
-  for (std::size_t i = 0; i < count; ++i) {
-    const LoopCandidate& candidate = detection.candidates[i];
+  struct Opinion {
+    TemporalEvidence temporal;
     std::optional<GeometricEvidence> geometric;
     std::string reason;
-    Stopwatch watch;
-    TemporalEvidence temporal =
+  };
+  std::vector<Opinion> opinions(count);
+  Stopwatch watch;
+  for (std::size_t i = 0; i < count; ++i) {
+    const LoopCandidate& candidate = detection.candidates[i];
+    Opinion& opinion = opinions[i];
+    opinion.temporal =
         check_temporal(detection.frame, candidate.match, query_descriptor, match_descriptor, parameters_.temporal);
-    detection.temporal_ms += watch.lap_ms();
     if (candidate.score() < parameters_.geometric.min_descriptor_score) {
       char text[96];
       std::snprintf(text, sizeof text, "descriptor score %.3f below %.3f", candidate.score(),
                     parameters_.geometric.min_descriptor_score);
-      reason = text;
-    } else if (!temporal.consistent) {
-      reason = temporal.reason;
-    } else {
-      if (!query) query.emplace(prepared.cloud);
-      ScanGeometry match(places_.at(candidate.match).cloud);
-      geometric = check_geometric(match, *query, candidate.yaw_rad, parameters_.geometric);
-      detection.geometric_ms += watch.lap_ms();
-      reason = geometric->reason;
+      opinion.reason = text;
+    } else if (!opinion.temporal.consistent) {
+      opinion.reason = opinion.temporal.reason;
     }
+  }
+  detection.temporal_ms += watch.lap_ms();
+
+  // Each candidate is registered on its own; who finishes first does not matter.
+  std::optional<ScanGeometry> query;
+  if (std::any_of(opinions.begin(), opinions.end(), [](const Opinion& o) { return o.reason.empty(); }))
+    query.emplace(prepared.cloud);
+  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+    if (!opinions[i].reason.empty()) return;
+    ScanGeometry match(places_.at(detection.candidates[i].match).cloud);
+    opinions[i].geometric = check_geometric(match, *query, detection.candidates[i].yaw_rad, parameters_.geometric);
+    opinions[i].reason = opinions[i].geometric->reason;
+  });
+  detection.geometric_ms += watch.lap_ms();
+
+  for (std::size_t i = 0; i < count && !detection.loop; ++i) {
+    const LoopCandidate& candidate = detection.candidates[i];
+    Opinion& opinion = opinions[i];
     // The answer is the first candidate, unless a later one fits the scan better.
-    const double score = candidate.score() / 2.0 + (geometric ? geometric->inlier_ratio : 0.0);
-    if (detection.answer && !(reason.empty() && !detection.loop) && score <= detection.score) continue;
+    const double score = candidate.score() / 2.0 + (opinion.geometric ? opinion.geometric->inlier_ratio : 0.0);
+    const bool is_loop = opinion.reason.empty();
+    if (detection.answer && !is_loop && score <= detection.score) continue;
     detection.answer = candidate;
-    detection.temporal = std::move(temporal);
+    detection.temporal = std::move(opinion.temporal);
     detection.score = score;
-    detection.reason = reason;
-    detection.geometric = std::move(geometric);
-    if (reason.empty()) {
+    detection.reason = opinion.reason;
+    detection.geometric = std::move(opinion.geometric);
+    if (is_loop)
       detection.loop = LoopConstraint{detection.frame, candidate.match, detection.geometric->T_match_query,
                                       detection.geometric->inlier_ratio, detection.geometric->rmse_m};
-      return;
-    }
   }
 }
 

@@ -33,8 +33,8 @@ bool step(const SurfaceCloud& target, const SurfaceCloud& source, double width_m
   const std::size_t stride = width_m > kAllPointsBelow_m ? 4 : 1;
   for (std::size_t i = 0; i < source.size(); i += stride) {
     const Eigen::Vector3d p = T * source.point(i).cast<double>();
-    const auto neighbour = target.nearest(p.cast<float>());
-    if (neighbour.squared_distance_m2 > reach2) continue;
+    const auto neighbour = target.nearest(p.cast<float>(), reach2);
+    if (!std::isfinite(neighbour.squared_distance_m2)) continue;
     const Eigen::Vector3d n = target.normal(neighbour.index).cast<double>();
     if (n.squaredNorm() < 0.5) continue;
     const double residual = n.dot(p - target.point(neighbour.index).cast<double>());
@@ -66,14 +66,14 @@ DirectionalAgreement agreement_one_way(const SurfaceCloud& to, const SurfaceClou
                                        double inlier_distance_m, double farthest_m) {
   DirectionalAgreement result;
   constexpr double kReach = 2.5;  // in-plane distance to the nearest centroid, in inlier distances
-  const double reach2 = std::pow(kReach * inlier_distance_m, 2);
+  const auto reach2 = static_cast<float>(std::pow(kReach * inlier_distance_m, 2));
   for (std::size_t i = 0; i < from.size(); ++i) {
     if (from.is_ground(i)) continue;
     const Eigen::Vector3d p = T_to_from * from.point(i).cast<double>();
     if (p.norm() > farthest_m) continue;
     ++result.visible;
-    const auto neighbour = to.nearest(p.cast<float>());
-    if (static_cast<double>(neighbour.squared_distance_m2) > reach2) continue;
+    const auto neighbour = to.nearest(p.cast<float>(), reach2);
+    if (!std::isfinite(neighbour.squared_distance_m2)) continue;
     const Eigen::Vector3d n = to.normal(neighbour.index).cast<double>();
     const Eigen::Vector3d d = p - to.point(neighbour.index).cast<double>();
     const double distance = n.squaredNorm() < 0.5 ? d.norm() : std::abs(n.dot(d));

@@ -96,11 +96,39 @@ SurfaceCloud& SurfaceCloud::operator=(SurfaceCloud&& other) noexcept {
   return *this;
 }
 
-SurfaceCloud::Neighbour SurfaceCloud::nearest(const Eigen::Vector3f& query) const {
-  std::uint32_t index = 0;
-  float distance2 = std::numeric_limits<float>::infinity();
-  if (tree_->index) tree_->index->knnSearch(query.data(), 1, &index, &distance2);
-  return {index, distance2};
+namespace {
+
+// What nanoflann asks of a result set: the nearest point within a reach, which spares it all boxes farther away.
+class NearestWithin {
+ public:
+  using DistanceType = float;
+  explicit NearestWithin(float squared_reach_m2) : distance2_(squared_reach_m2) {}
+  bool full() const { return true; }
+  bool addPoint(float distance2, std::uint32_t index) {
+    if (distance2 < distance2_) {
+      distance2_ = distance2;
+      index_ = index;
+      found_ = true;
+    }
+    return true;
+  }
+  float worstDist() const { return distance2_; }
+  SurfaceCloud::Neighbour result() const {
+    return {index_, found_ ? distance2_ : std::numeric_limits<float>::infinity()};
+  }
+
+ private:
+  float distance2_;
+  std::uint32_t index_ = 0;
+  bool found_ = false;
+};
+
+}  // namespace
+
+SurfaceCloud::Neighbour SurfaceCloud::nearest(const Eigen::Vector3f& query, float squared_reach_m2) const {
+  NearestWithin within(squared_reach_m2);
+  if (tree_->index) tree_->index->findNeighbors(within, query.data(), nanoflann::SearchParams());
+  return within.result();
 }
 
 std::vector<SurfaceCloud::Neighbour> SurfaceCloud::nearest(const Eigen::Vector3f& query, std::size_t k) const {

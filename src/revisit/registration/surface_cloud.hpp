@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -36,12 +37,13 @@ class SurfaceCloud {
   const Eigen::Vector3f& normal(std::size_t i) const { return normals_[i]; }
   bool is_ground(std::size_t i) const { return cloud_.is_ground[i] != 0; }
 
-  /// The nearest point and its squared distance; of an empty cloud, the distance is infinite.
+  /// The nearest point and its squared distance, which is infinite where no point is nearer than the reach.
   struct Neighbour {
     std::size_t index = 0;
     float squared_distance_m2 = 0.f;
   };
-  Neighbour nearest(const Eigen::Vector3f& query) const;
+  Neighbour nearest(const Eigen::Vector3f& query,
+                    float squared_reach_m2 = std::numeric_limits<float>::infinity()) const;
   /// Up to `k` nearest points, nearest first.
   std::vector<Neighbour> nearest(const Eigen::Vector3f& query, std::size_t k) const;
 

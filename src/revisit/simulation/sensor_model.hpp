@@ -34,7 +34,7 @@ struct SensorModel {
   double falloff = 0.5;           ///< ... with distance to this power
   double intensity_scale = 1.0;   ///< reading of a white target
   double intensity_step = 0.01;   ///< readings are whole multiples
-  double dark = 0.0;                 ///< share of the readings that are 0
+  double dark = 0.0;              ///< share of the readings that are 0
   double intensity_max = 1.0;     ///< larger readings saturate
 
   bool rotates() const { return !elevations_deg.empty(); }

@@ -55,6 +55,7 @@ GeometricEvidence check_geometric(ScanGeometry& match, ScanGeometry& query, doub
     best->feature_inliers = inliers;
   };
   for (const bool from_features : {options.features_first, !options.features_first}) {
+    if (best && !options.features_first && !options.features_fallback) break;
     if (from_features) {
       const auto features = align_features(match.surface(), match.features(options.feature_radius_m), query.surface(),
                                            query.features(options.feature_radius_m));

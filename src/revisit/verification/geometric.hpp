@@ -22,8 +22,8 @@ struct GeometricEvidence {
 };
 
 /// Geometric consistency (paper, section III-D): registers the query onto the match by ICP, from the yaw that the
-/// descriptors agreed on and, where that is not consistent, from FPFH's transform (or, with features_first, the other
-/// way round); judges the better of both. Deterministic; one thread a scan.
+/// descriptors agreed on; with features_fallback, from FPFH's transform where that is not consistent; with
+/// features_first, the other way round. Judges the better of both. Deterministic; one thread a scan.
 GeometricEvidence check_geometric(ScanGeometry& match, ScanGeometry& query, double yaw_rad,
                                   const GeometricOptions& options);
 

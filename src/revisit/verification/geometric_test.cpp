@@ -31,7 +31,10 @@ TEST(GeometricConsistency, ARevisitGivesItsPose) {
 TEST(GeometricConsistency, FeaturesSaveAWrongYaw) {
   const Pose T_match = SyntheticWorld::at(0, 0, 0), T_query = SyntheticWorld::at(2, 1, to_radians(100.0));
   ScanGeometry match = scan_at(31, T_match), query = scan_at(31, T_query);
-  const GeometricEvidence evidence = check_geometric(match, query, 0.0, {});
+  EXPECT_FALSE(check_geometric(match, query, 0.0, {}).consistent);
+  GeometricOptions options;
+  options.features_fallback = true;
+  const GeometricEvidence evidence = check_geometric(match, query, 0.0, options);
   ASSERT_TRUE(evidence.consistent) << evidence.reason;
   EXPECT_TRUE(evidence.from_features);
   EXPECT_GT(evidence.feature_inliers, 9u);
