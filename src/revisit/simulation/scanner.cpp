@@ -6,7 +6,8 @@
 #include <cmath>
 
 #include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
+
+#include <revisit/simulation/internal/threads.hpp>
 
 namespace revisit::simulation_internal {
 namespace {
@@ -263,7 +264,7 @@ Scan Scanner::sweep(std::int64_t frame, double time_s) const {
 
   constexpr std::size_t kChunk = 1000;
   std::vector<Return> returns(sensor_.beams());
-  tbb::task_arena arena(options_.threads > 0 ? options_.threads : tbb::task_arena::automatic);
+  tbb::task_arena arena(threads_to_use(options_.threads));
   arena.execute([&] {
     tbb::parallel_for(std::size_t{0}, (returns.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
       const std::size_t first = chunk * kChunk;

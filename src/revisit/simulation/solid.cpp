@@ -112,7 +112,7 @@ Span clip_to_cylinder(const LocalRay& ray, const Vector3f& half) {
 float through_leaves(const Solid& solid, const LocalRay& ray, const Span& span, float limit_m) {
   constexpr float kStep = 0.17f, kCellsPerMetre = 4.f;
   const std::uint64_t seed = static_cast<std::uint64_t>(solid.object) << 32;
-  const float end = std::min(span.leave, limit_m);
+  const float end = std::min(span.leave, limit_m + kStep);  // a leaf may hang up to a step before
   for (float t = span.enter + 0.5f * kStep; t < end; t += kStep) {
     const Vector3f p = ray.at(t) * kCellsPerMetre;
     const auto x = static_cast<std::uint64_t>(floor_int(p.x()) + 512),

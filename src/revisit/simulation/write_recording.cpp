@@ -10,6 +10,7 @@
 #include <revisit/config/parameter_file.hpp>
 #include <revisit/io/pose_file.hpp>
 #include <revisit/io/result_files.hpp>
+#include <revisit/simulation/internal/threads.hpp>
 
 namespace revisit {
 namespace {
@@ -68,7 +69,7 @@ Status write_recording(const SimulatedRecording& recording, const fs::path& fold
     }
   };
   // Scans are taken in order, one a thread, so that a run that is cut short leaves no holes.
-  tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
+  tbb::task_arena arena(simulation_internal::threads_to_use(threads));
   arena.execute([&] {
     tbb::parallel_for(
         0, arena.max_concurrency(), [&](int) { work(); }, tbb::simple_partitioner());
