@@ -1,28 +1,32 @@
 #!/usr/bin/env bash
-# The main job on real scans: find the loops of a recording, score them, draw them. Ends by naming the report.
-# Recording: DATA=FOLDER, by default the small KITTI folder beside the project.
+# The main job, end to end: find the loops of a recording, score them, draw them. Ends by naming the report.
+# Without DATA=FOLDER the recording is a simulated drive of 1 km through a town, in streets that come again the same way
+# and the other way; no scan of it is written to the disk.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-recording=${DATA:-../shared/data/kitti00_mini}
 out=${OUT:-out/demo}
-if [ ! -d "$recording" ]; then
+recording=${DATA:-}
+if [ -z "$recording" ]; then
+  mkdir -p "$out"
+  recording=$out/town.toml
+  printf '[simulation]\nworld = "town"\nsensor = "hdl64e"\nseed = 1\nlength_m = 1000\n' > "$recording"
+  reference=$recording
+fi
+if [ ! -e "$recording" ]; then
   echo "no recording at $recording: name one, e.g. make demo DATA=kitti/sequences/00" >&2
   exit 1
 fi
+for poses in "$recording"/poses.txt "$recording"/poses_subset.txt; do
+  if [ -f "$poses" ]; then reference=${reference:-$poses}; fi
+done
 build/revisit info "$recording"
 echo
 build/revisit detect "$recording" --out "$out" --overwrite
 query=$(awk -F, 'NR > 1 { print $1; exit }' "$out/loops.csv")
-if [ -n "$query" ]; then
-  for scan in "$recording"/velodyne/*"$(printf '%06d' "$query")".bin; do
-    if [ -f "$scan" ]; then build/revisit describe "$scan" --out "$out/scan.png"; fi
-  done
-fi
+if [ -n "$query" ]; then build/revisit describe "$recording" --frame "$query" --out "$out/scan.png"; fi
 echo
-for reference in "$recording"/poses.txt "$recording"/poses_subset.txt; do
-  if [ -f "$reference" ]; then
-    build/revisit evaluate "$out" --reference "$reference"
-    exit 0
-  fi
-done
-echo "Report: $out/loops.csv (no reference poses: nothing to score against)"
+if [ -n "${reference:-}" ]; then
+  build/revisit evaluate "$out" --reference "$reference"
+else
+  echo "Report: $out/loops.csv (no reference poses: nothing to score against)"
+fi

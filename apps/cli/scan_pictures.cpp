@@ -58,6 +58,26 @@ void draw_descriptor(Canvas& canvas, const IntensityScanContext& descriptor, con
   canvas.frame(box, {0.3, 0.3, 0.3});
 }
 
+// What is nearer to the viewer, who stands on the right, hides nothing: all points are drawn.
+void draw_from_the_side(Canvas& canvas, const PreparedScan& prepared, const DescriptorOptions& options) {
+  const double reach_m = options.max_range_m;
+  constexpr double kBelow_m = 4.0;
+  const Box box{90, 880, 1600, 290};
+  const double shown_m = 2.0 * reach_m * box.height / box.width;
+  Chart chart(canvas, box, {-reach_m, reach_m}, {-kBelow_m, shown_m - kBelow_m});
+  chart.draw_axes("the scan from its right side", "x, forward (m)", "z, up (m)");
+  canvas.clip(box);
+  const auto& points = prepared.scan.points;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (std::abs(static_cast<double>(points[i].y)) > reach_m) continue;
+    const Pixel p = chart.at(points[i].x, points[i].z);
+    canvas.fill({p.x - 0.6, p.y - 0.6, 1.2, 1.2},
+                prepared.ground.is_ground[i] != 0 ? kGround : scale_colour(points[i].intensity));
+  }
+  canvas.dot(chart.at(0, 0), 4, {0.85, 0.1, 0.1});
+  canvas.unclip();
+}
+
 void draw_legend(Canvas& canvas) {
   const Box bar{930, 760, 380, 18};
   for (int i = 0; i < 190; ++i) canvas.fill({bar.x + i * 2.0, bar.y, 2.5, bar.height}, scale_colour(i / 189.0));
@@ -75,11 +95,12 @@ void draw_legend(Canvas& canvas) {
 
 Status draw_description(const std::filesystem::path& file, const PreparedScan& prepared, const Parameters& parameters,
                         const std::string& title) {
-  Canvas canvas(1730, 860);
+  Canvas canvas(1730, 1230);
   canvas.text({865, 20}, title, 16, Align::kCentre);
   draw_from_above(canvas, prepared, parameters);
   draw_descriptor(canvas, prepared.descriptor, parameters.descriptor);
   draw_legend(canvas);
+  draw_from_the_side(canvas, prepared, parameters.descriptor);
   return canvas.save_png(file);
 }
 

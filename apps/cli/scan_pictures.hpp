@@ -9,7 +9,8 @@
 
 namespace revisit::cli {
 
-/// The scan from above (ground pale, intensity as colour, the polar grid over it) beside its descriptor.
+/// The scan from above (ground pale, intensity as colour, the polar grid over it) and from the side, with its
+/// descriptor.
 Status draw_description(const std::filesystem::path& file, const PreparedScan& prepared, const Parameters& parameters,
                         const std::string& title);
 
