@@ -13,6 +13,7 @@
 #include <revisit/io/pose_file.hpp>
 #include <revisit/io/result_files.hpp>
 
+#include "run_program.hpp"
 #include "shared_data.hpp"
 #include "synthetic_world.hpp"
 
@@ -21,23 +22,10 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing_support::fresh_folder;
+using testing_support::Outcome;
+using testing_support::run;
 using testing_support::shared_data;
 using testing_support::SyntheticWorld;
-
-struct Outcome {
-  int code = -1;
-  std::string output;  // both streams
-};
-
-Outcome run(const std::string& arguments) {
-  Outcome outcome;
-  FILE* pipe = popen((std::string(REVISIT_PROGRAM) + " " + arguments + " 2>&1 </dev/null").c_str(), "r");
-  char buffer[4096];
-  while (const std::size_t n = fread(buffer, 1, sizeof buffer, pipe)) outcome.output.append(buffer, n);
-  const int status = pclose(pipe);
-  outcome.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  return outcome;
-}
 
 std::string content(const fs::path& file) {
   std::stringstream text;
@@ -297,7 +285,7 @@ TEST(Cli, DescribeDrawsAndInfoTells) {
     EXPECT_NE(info.output.find(fact), std::string::npos) << fact << "\n" << info.output;
   for (const char* wrong : {"a.jpg", "000000.bin", "no/such/folder/a.png"})
     EXPECT_EQ(run("describe " + scan + " --out " + (folder / wrong).string()).code, 2) << "nothing else is overwritten";
-  EXPECT_NE(run("describe " + recording.string() + " --out " + (folder / "b.png").string()).output.find("is a folder"),
+  EXPECT_NE(run("describe " + recording.string() + " --out " + (folder / "b.png").string()).output.find("is a recording"),
             std::string::npos);
   EXPECT_EQ(run("info " + scan).code, 0);
   EXPECT_EQ(run("info /no/such.bin").code, 1);
