@@ -285,8 +285,9 @@ TEST(Cli, DescribeDrawsAndInfoTells) {
     EXPECT_NE(info.output.find(fact), std::string::npos) << fact << "\n" << info.output;
   for (const char* wrong : {"a.jpg", "000000.bin", "no/such/folder/a.png"})
     EXPECT_EQ(run("describe " + scan + " --out " + (folder / wrong).string()).code, 2) << "nothing else is overwritten";
-  EXPECT_NE(run("describe " + recording.string() + " --out " + (folder / "b.png").string()).output.find("is a recording"),
-            std::string::npos);
+  EXPECT_NE(
+      run("describe " + recording.string() + " --out " + (folder / "b.png").string()).output.find("is a recording"),
+      std::string::npos);
   EXPECT_EQ(run("info " + scan).code, 0);
   EXPECT_EQ(run("info /no/such.bin").code, 1);
 }
