@@ -9,6 +9,7 @@ namespace {
 // `count` lines from `first_deg` down in equal steps.
 std::vector<double> lines(int count, double first_deg, double last_deg) {
   std::vector<double> elevations;
+  elevations.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) elevations.push_back(first_deg + (last_deg - first_deg) * i / (count - 1));
   return elevations;
 }

@@ -115,9 +115,8 @@ float through_leaves(const Solid& solid, const LocalRay& ray, const Span& span, 
   const float end = std::min(span.leave, limit_m + kStep);  // a leaf may hang up to a step before
   for (float t = span.enter + 0.5f * kStep; t < end; t += kStep) {
     const Vector3f p = ray.at(t) * kCellsPerMetre;
-    const auto x = static_cast<std::uint64_t>(floor_int(p.x()) + 512),
-               y = static_cast<std::uint64_t>(floor_int(p.y()) + 512),
-               z = static_cast<std::uint64_t>(floor_int(p.z()) + 512);
+    const auto x = as_key(floor_int(p.x()) + 512), y = as_key(floor_int(p.y()) + 512),
+               z = as_key(floor_int(p.z()) + 512);
     const std::uint64_t key = mix(seed ^ (x << 20) ^ (y << 10) ^ z);
     if ((key & 0xff) < 64)
       return std::max(span.enter, t - kStep * static_cast<float>((key >> 8) & 0xff) * (1.f / 256.f));
@@ -154,7 +153,7 @@ float through_facade(const Solid& solid, const LocalRay& ray, Span& span, Materi
   const float top = solid.shape == Shape::kWedge ? solid.eaves : solid.half.z();
   if (static_cast<float>(storey + 1) * facade.floor_m > top - solid.ground + 0.3f) return span.enter;
   const auto key = mix(static_cast<std::uint64_t>(solid.object), static_cast<std::uint64_t>(floor_int(column)),
-                       static_cast<std::uint64_t>(wall_axis + (span.normal[wall_axis] > 0.f ? 2 : 0)));
+                       as_key(wall_axis + (span.normal[wall_axis] > 0.f ? 2 : 0)));
   const bool is_door = storey == 0 && (key & 3) == 0;
   const bool is_walled = !is_door && ((key >> (8 + 2 * (storey & 7))) & 3) == 0;  // every fourth window is missing
   const float sill = is_door ? 0.f : facade.sill_m, half_width = 0.5f * (is_door ? 1.2f : facade.window_m);

@@ -19,7 +19,7 @@ constexpr std::array<Junction, 4> kMoves = {{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};
 
 // A crooked grid: junctions some 80 m apart, none quite where its neighbours would have it.
 Eigen::Vector2d position(const Junction& j, std::uint64_t seed) {
-  const auto key = mix(seed, static_cast<std::uint64_t>(j.column + 1000), static_cast<std::uint64_t>(j.row + 1000));
+  const auto key = mix(seed, as_key(j.column + 1000), as_key(j.row + 1000));
   return {84.0 * j.column + 24.0 * static_cast<double>(uniform(key) - 0.5f),
           78.0 * j.row + 24.0 * static_cast<double>(uniform(key + 1) - 0.5f)};
 }

@@ -53,8 +53,7 @@ class TownBuilder {
   // One random stream a place, so that the town does not depend on how it is walked through.
   Random random_at(const LanePoint& p, int what) const {
     return Random(mix(world_.seed,
-                      static_cast<std::uint64_t>(floor_int(p.x * 2.f) + 100000) * 400009 +
-                          static_cast<std::uint64_t>(floor_int(p.y * 2.f) + 100000),
+                      as_key(floor_int(p.x * 2.f) + 100000) * 400009 + as_key(floor_int(p.y * 2.f) + 100000),
                       static_cast<std::uint64_t>(what)));
   }
   bool is_due(const LanePoint& p, double& next_m) const { return static_cast<double>(p.arc_m) >= next_m; }
@@ -289,8 +288,8 @@ District district_at(const World& world, double x, double y) {
   for (const Eigen::Vector2d& middle : world.featureless)
     if ((Eigen::Vector2d(x, y) - middle).squaredNorm() < kStretch_m * kStretch_m) return District::kFeatureless;
   constexpr double kBlock_m = 115.0;
-  const auto block = mix(mix(world.seed, 21), static_cast<std::uint64_t>(floor_int(x / kBlock_m) + 10000),
-                         static_cast<std::uint64_t>(floor_int(y / kBlock_m) + 10000));
+  const auto block =
+      mix(mix(world.seed, 21), as_key(floor_int(x / kBlock_m) + 10000), as_key(floor_int(y / kBlock_m) + 10000));
   const float dice = uniform(block);
   return dice < 0.38f   ? District::kRows
          : dice < 0.72f ? District::kDetached

@@ -19,6 +19,9 @@ inline std::uint64_t mix(std::uint64_t x) {
 inline std::uint64_t mix(std::uint64_t a, std::uint64_t b) { return mix(a ^ mix(b)); }
 inline std::uint64_t mix(std::uint64_t a, std::uint64_t b, std::uint64_t c) { return mix(mix(a, b), c); }
 
+/// A whole number, negative ones too, as a key.
+inline std::uint64_t as_key(std::int64_t whole) { return static_cast<std::uint64_t>(whole); }
+
 /// Uniform in [0, 1).
 inline float uniform(std::uint64_t key) { return static_cast<float>(mix(key) >> 40) * 0x1p-24f; }
 
@@ -44,7 +47,7 @@ inline int floor_int(double x) {
 inline double smooth_noise(std::uint64_t seed, double x) {
   const double cell = std::floor(x), t = x - cell, s = t * t * (3.0 - 2.0 * t);
   const auto at = [&](double c) {
-    return 2.0 * static_cast<double>(uniform(mix(seed, static_cast<std::uint64_t>(static_cast<std::int64_t>(c))))) -
+    return 2.0 * static_cast<double>(uniform(mix(seed, as_key(static_cast<std::int64_t>(c))))) -
            1.0;
   };
   return (1.0 - s) * at(cell) + s * at(cell + 1.0);
@@ -52,7 +55,7 @@ inline double smooth_noise(std::uint64_t seed, double x) {
 inline double smooth_noise(std::uint64_t seed, double x, double y) {
   const double row = std::floor(y), t = y - row, s = t * t * (3.0 - 2.0 * t);
   const auto at = [&](double r) {
-    return smooth_noise(mix(seed, static_cast<std::uint64_t>(static_cast<std::int64_t>(r))), x);
+    return smooth_noise(mix(seed, as_key(static_cast<std::int64_t>(r))), x);
   };
   return (1.0 - s) * at(row) + s * at(row + 1.0);
 }
