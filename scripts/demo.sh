@@ -10,12 +10,12 @@ if [ -z "$recording" ]; then
   mkdir -p "$out"
   recording=$out/town.toml
   printf '[simulation]\nworld = "town"\nsensor = "hdl64e"\nseed = 1\nlength_m = 1000\n' > "$recording"
-  reference=$recording
 fi
 if [ ! -e "$recording" ]; then
   echo "no recording at $recording: name one, e.g. make demo DATA=kitti/sequences/00" >&2
   exit 1
 fi
+case $recording in *.toml) reference=$recording ;; esac
 for poses in "$recording"/poses.txt "$recording"/poses_subset.txt; do
   if [ -f "$poses" ]; then reference=${reference:-$poses}; fi
 done

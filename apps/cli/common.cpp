@@ -30,6 +30,16 @@ spdlog::logger& logger() {
   return *instance;
 }
 
+// A trajectory in it is named as seen from the file.
+Result<Parameters> read_parameter_file(const std::string& file, const Parameters& base) {
+  auto parameters = read_parameters(file, base);
+  if (!parameters) return parameters;
+  std::string& trajectory = parameters->simulation.trajectory;
+  if (!trajectory.empty() && trajectory != base.simulation.trajectory)
+    trajectory = (std::filesystem::path(file).parent_path() / trajectory).lexically_normal().string();
+  return parameters;
+}
+
 }  // namespace
 
 void ParameterFlags::add_to(CLI::App& command, const std::vector<std::string>& sections, Names names) {
@@ -58,7 +68,7 @@ void ParameterFlags::add_to(CLI::App& command, const std::vector<std::string>& s
 
 Result<Parameters> ParameterFlags::resolve() const {
   auto parameters = preset(preset_);
-  if (parameters && !file_.empty()) parameters = read_parameters(file_, *parameters);
+  if (parameters && !file_.empty()) parameters = read_parameter_file(file_, *parameters);
   if (!parameters) return parameters;
   for (const auto& [name, value] : values_)
     if (const Status status = set_parameter(*parameters, name, value); !status)
@@ -71,12 +81,8 @@ Result<std::unique_ptr<Recording>> open_input(const std::string& input, const st
                                               Parameters* parameters) {
   if (std::filesystem::path(input).extension() != ".toml") return open_recording(input, print_log(), poses_file);
   if (!poses_file.empty()) return Error{poses_file + ": a simulated recording has its own, exact poses"};
-  auto described = read_parameters(input);
+  const auto described = read_parameter_file(input, {});
   if (!described) return described.error();
-  // A trajectory is named as seen from the file.
-  std::string& trajectory = described->simulation.trajectory;
-  if (!trajectory.empty())
-    trajectory = (std::filesystem::path(input).parent_path() / trajectory).lexically_normal().string();
   auto recording = simulate(described->simulation, print_log());
   if (!recording) return recording.error();
   if (parameters != nullptr) parameters->simulation = described->simulation;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// The readable reference: scalar, by definition. bits_search.cpp holds what is fast.
 #include <revisit/bits/occupancy_bits.h>
 
 #include <bit>
@@ -22,20 +23,15 @@ inline uint64_t read_cyclic(const uint64_t* words, uint32_t cells, uint32_t star
   return value;
 }
 
-uint32_t hamming_at_shift(const uint64_t* query, const uint64_t* candidate, uint32_t cells, uint32_t rotation) {
-  const auto words = static_cast<uint32_t>(revisit_bits_words(cells));
-  const uint32_t tail = cells % 64;
-  // Bit b of the turned query is bit b - rotation of the query.
-  uint32_t start = (cells - rotation) % cells;
-  uint32_t distance = 0;
-  for (uint32_t w = 0; w < words; ++w) {
-    uint64_t difference = read_cyclic(query, cells, start) ^ candidate[w];
-    if (w + 1 == words && tail != 0) difference &= (uint64_t{1} << tail) - 1;
-    distance += static_cast<uint32_t>(std::popcount(difference));
-    start = (start + 64) % cells;
-  }
-  return distance;
+// Word `w` of the query turned by `shift` sectors: its bit b is bit b - shift * rings of the query.
+uint64_t turned_word(const uint64_t* query, uint32_t rings, uint32_t sectors, uint32_t shift, uint32_t w) {
+  const uint32_t cells = rings * sectors, tail = cells % 64;
+  const uint64_t value = read_cyclic(query, cells, (cells - shift * rings + 64 * w) % cells);
+  const bool is_last = w + 1 == revisit_bits_words(cells);
+  return is_last && tail != 0 ? value & ((uint64_t{1} << tail) - 1) : value;
 }
+
+uint32_t filled_up(uint32_t turns) { return (turns + 7) / 8 * 8; }
 
 }  // namespace
 
@@ -43,14 +39,40 @@ size_t revisit_bits_words(uint32_t cells) { return (size_t{cells} + 63) / 64; }
 
 uint32_t revisit_bits_min_hamming(const uint64_t* query, const uint64_t* candidate, uint32_t rings, uint32_t sectors,
                                   uint32_t* best_shift) {
-  const uint32_t cells = rings * sectors;
+  const auto words = static_cast<uint32_t>(revisit_bits_words(rings * sectors));
   uint32_t best = UINT32_MAX;
   for (uint32_t k = 0; k < sectors; ++k) {
-    const uint32_t distance = hamming_at_shift(query, candidate, cells, k * rings);
+    uint32_t distance = 0;
+    for (uint32_t w = 0; w < words; ++w)
+      distance += static_cast<uint32_t>(std::popcount(turned_word(query, rings, sectors, k, w) ^ candidate[w]));
     if (distance < best) {
       best = distance;
       *best_shift = k;
     }
   }
   return best;
+}
+
+size_t revisit_bits_turned_words(uint32_t rings, uint32_t sectors) {
+  return revisit_bits_words(rings * sectors) * filled_up(sectors);
+}
+
+void revisit_bits_turn(const uint64_t* query, uint32_t rings, uint32_t sectors, uint64_t* turned) {
+  const auto words = static_cast<uint32_t>(revisit_bits_words(rings * sectors));
+  const uint32_t lanes = filled_up(sectors);
+  // The lanes that fill up repeat the first turn: of equal distances the first counts, so they never win.
+  for (uint32_t w = 0; w < words; ++w)
+    for (uint32_t lane = 0; lane < lanes; ++lane)
+      turned[size_t{w} * lanes + lane] = turned_word(query, rings, sectors, lane < sectors ? lane : 0, w);
+}
+
+void revisit_bits_count(const uint64_t* image, uint32_t rings, uint32_t sectors, uint8_t counts[REVISIT_BITS_GROUPS]) {
+  uint32_t sums[REVISIT_BITS_GROUPS] = {};
+  for (uint32_t sector = 0; sector < sectors; ++sector)
+    for (uint32_t ring = 0; ring < rings; ++ring) {
+      const uint32_t bit = sector * rings + ring;
+      sums[size_t{ring} * REVISIT_BITS_GROUPS / rings] += static_cast<uint32_t>(image[bit / 64] >> (bit % 64) & 1);
+    }
+  for (int group = 0; group < REVISIT_BITS_GROUPS; ++group)
+    counts[group] = static_cast<uint8_t>(sums[group] < 255 ? sums[group] : 255);
 }

@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/bits/occupancy_bits.h>
 
+#include <algorithm>
+#include <cstdlib>
 #include <random>
+#include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include <revisit/bits/internal/targets.hpp>
 
 namespace {
 
@@ -67,6 +73,102 @@ TEST(OccupancyBits, FindsEveryTurn) {
     uint32_t shift = UINT32_MAX;
     EXPECT_EQ(revisit_bits_min_hamming(image.packed().data(), image.turned(k).packed().data(), 60, 20, &shift), 0u);
     EXPECT_EQ(shift, k);
+  }
+}
+
+std::vector<uint64_t> turned(const Image& query) {
+  std::vector<uint64_t> words(revisit_bits_turned_words(query.rings, query.sectors));
+  revisit_bits_turn(query.packed().data(), query.rings, query.sectors, words.data());
+  return words;
+}
+
+using revisit::bits_internal::force_target;
+using revisit::bits_internal::supported_targets;
+
+class EveryInstructionSet : public testing::Test {
+ protected:
+  ~EveryInstructionSet() override { force_target(0); }
+};
+
+TEST_F(EveryInstructionSet, FindsTheDistanceAndShiftOfTheReference) {
+  std::mt19937 generator(3);
+  for (const int64_t target : supported_targets()) {
+    force_target(target);
+    SCOPED_TRACE(revisit::bits_internal::current_target_name());
+    for (const auto& [rings, sectors] : {std::pair{60u, 20u},
+                                         {20u, 60u},
+                                         {1u, 1u},
+                                         {3u, 5u},
+                                         {64u, 1u},
+                                         {1u, 64u},
+                                         {64u, 64u},
+                                         {7u, 37u},
+                                         {65u, 130u}})
+      for (int trial = 0; trial < 10; ++trial) {
+        const Image query = random_image(rings, sectors, 0.4, generator);
+        // Unlike, alike, and turned: the last have several shifts of equal distance.
+        Image candidate = trial < 4 ? random_image(rings, sectors, 0.3, generator) : query.turned(trial % sectors);
+        if (trial >= 7) candidate.cells[0] = !candidate.cells[0];
+        uint32_t expected_shift = 0, shift = UINT32_MAX;
+        const uint32_t expected =
+            revisit_bits_min_hamming(query.packed().data(), candidate.packed().data(), rings, sectors, &expected_shift);
+        const auto distance = [&](uint32_t limit) {
+          return revisit_bits_min_hamming_turned(turned(query).data(), candidate.packed().data(), rings, sectors, limit,
+                                                 &shift);
+        };
+        ASSERT_EQ(distance(UINT32_MAX), expected) << rings << " x " << sectors;
+        ASSERT_EQ(shift, expected_shift);
+        ASSERT_EQ(distance(expected + 1), expected) << "just below the limit";
+        ASSERT_EQ(shift, expected_shift);
+        shift = 77777;
+        ASSERT_EQ(distance(expected), UINT32_MAX) << "not below the limit";
+        ASSERT_EQ(shift, 77777u);
+      }
+  }
+}
+
+TEST_F(EveryInstructionSet, BoundsAreTheSumsOfDifferencesAndNeverAboveTheDistance) {
+  std::mt19937 generator(4);
+  for (const int64_t target : supported_targets()) {
+    force_target(target);
+    for (const auto& [rings, sectors] : {std::pair{60u, 20u}, {20u, 60u}, {3u, 5u}, {64u, 64u}}) {
+      constexpr size_t kPlaces = 2 * REVISIT_BITS_BLOCK;
+      const Image query = random_image(rings, sectors, 0.5, generator);
+      uint8_t q[REVISIT_BITS_GROUPS], c[REVISIT_BITS_GROUPS];
+      revisit_bits_count(query.packed().data(), rings, sectors, q);
+      std::vector<uint8_t> counts(kPlaces * REVISIT_BITS_GROUPS), bounds(kPlaces);
+      std::vector<uint32_t> sums(kPlaces), distances(kPlaces);
+      for (size_t i = 0; i < kPlaces; ++i) {
+        const Image place = random_image(rings, sectors, 0.004 * static_cast<double>(i), generator);
+        revisit_bits_count(place.packed().data(), rings, sectors, c);
+        for (size_t group = 0; group < REVISIT_BITS_GROUPS; ++group) {
+          counts[(i / 64 * REVISIT_BITS_GROUPS + group) * 64 + i % 64] = c[group];
+          sums[i] += static_cast<uint32_t>(std::abs(int{q[group]} - int{c[group]}));
+        }
+        uint32_t shift = 0;
+        distances[i] = revisit_bits_min_hamming(query.packed().data(), place.packed().data(), rings, sectors, &shift);
+      }
+      revisit_bits_bounds(q, counts.data(), kPlaces / REVISIT_BITS_BLOCK, bounds.data());
+      for (size_t i = 0; i < kPlaces; ++i) {
+        EXPECT_EQ(bounds[i], std::min(sums[i], 255u));
+        EXPECT_LE(bounds[i], distances[i]);
+      }
+    }
+  }
+}
+
+TEST_F(EveryInstructionSet, ForcingOneChangesWhatRuns) {
+  std::set<size_t> lanes;
+  std::set<std::string> names;
+  const auto targets = supported_targets();
+  for (const int64_t target : targets) {
+    force_target(target);
+    lanes.insert(revisit::bits_internal::running_lanes());
+    names.insert(revisit::bits_internal::current_target_name());
+  }
+  EXPECT_EQ(names.size(), targets.size());
+  if (targets.size() > 3) {
+    EXPECT_GT(lanes.size(), 1u) << "vectors of 128, 256, 512 bits";
   }
 }
 

@@ -71,7 +71,10 @@ Result<PoseFile> from_rows(const std::filesystem::path& file, const std::vector<
       row.stamp_s = v[0];
       pose = std::isfinite(v[0]) ? from_quaternion(v.data() + 1) : std::nullopt;
     } else {
-      if (std::all_of(v.end() - 12, v.end(), [](double x) { return std::isnan(x); })) continue;
+      if (std::all_of(v.end() - 12, v.end(), [](double x) { return std::isnan(x); })) {
+        ++poses.rows_without_pose;
+        continue;
+      }
       const double frame = width == 13 ? v[0] : static_cast<double>(i);
       if (!(frame >= 0.0 && frame < 1e15) || frame != std::floor(frame))
         return bad_row(file, rows[i].line, std::to_string(frame) + " is no frame number");

@@ -23,6 +23,7 @@ struct PoseRow {
 
 struct PoseFile {
   PoseFormat format = PoseFormat::kKitti;
+  std::size_t rows_without_pose = 0;  ///< KITTI rows of NaN, which are left out
   std::vector<PoseRow> rows;
 };
 

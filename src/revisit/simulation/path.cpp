@@ -13,6 +13,16 @@ Path::Path(std::vector<Knot> knots) : knots_(std::move(knots)), arc_m_(knots_.si
     arc_m_[i] = arc_m_[i - 1] + std::hypot(knots_[i].x - knots_[i - 1].x, knots_[i].y - knots_[i - 1].y);
 }
 
+Path Path::moved(const Eigen::Vector3d& by) const {
+  std::vector<Knot> knots = knots_;
+  for (Knot& knot : knots) {
+    knot.x += by.x();
+    knot.y += by.y();
+    knot.ground_z += by.z();
+  }
+  return Path(std::move(knots));
+}
+
 Knot Path::at(double time_s) const {
   const double last = static_cast<double>(knots_.size() - 1);
   const double position = time_s / kStep_s, from = std::clamp(std::floor(position), 0.0, last - 1.0);

@@ -120,6 +120,9 @@ Result<Path> read_path(const std::filesystem::path& file, const LogSink& log) {
   std::vector<Stop> stops;
   PoseFormat format = PoseFormat::kTum;
   if (poses) {
+    if (poses->rows_without_pose > 0)
+      return Error{file.string() + ": " + std::to_string(poses->rows_without_pose) +
+                   " rows of NaN are frames without a pose; a drive needs a pose for every frame"};
     format = poses->format;
     stops = to_stops(*poses);
   } else {
@@ -130,7 +133,12 @@ Result<Path> read_path(const std::filesystem::path& file, const LogSink& log) {
   }
   if (const Status status = check(file, stops, format); !status) return status.error();
   if (!poses) add_headings(stops);
-  return resample(stops);
+  Path path = resample(stops);
+  constexpr double kShortest_m = 1.0;
+  if (path.length_m() < kShortest_m)
+    return Error{file.string() + ": the drive is " + std::to_string(path.length_m()) + " m long; allowed: from " +
+                 std::to_string(kShortest_m) + " m"};
+  return path;
 }
 
 }  // namespace revisit::simulation_internal

@@ -64,14 +64,31 @@ double Scanner::falloff_at(double range_m) const {
 }
 
 Pose Scanner::T_world_lidar(double time_s) const {
+  Pose T = T_local_lidar(time_s);
+  T.translation() += world_.origin;
+  return T;
+}
+
+Pose Scanner::T_local_lidar(double time_s) const {
   const Knot at = world_.path.at(time_s);
+  const double height_m = world_.vehicle.roof_m + sensor_.mast_m;
+  Pose T = Pose::Identity();
+  if (options_.tilt_deg > 0.0) {  // carried by hand: it sways about itself, now and then as far as it may
+    Eigen::Vector3d tilt(1.6 * smooth_noise(mix(world_.seed, 64), time_s / 2.3),
+                         1.6 * smooth_noise(mix(world_.seed, 65), time_s / 2.9), 0.0);
+    tilt *= to_radians(options_.tilt_deg) / std::max(1.0, tilt.norm());
+    T.translate(Eigen::Vector3d(at.x, at.y, world_.terrain.height(at.x, at.y) + height_m));
+    T.rotate(Eigen::AngleAxisd(at.yaw_rad, Eigen::Vector3d::UnitZ()));
+    if (tilt.norm() > 0.0) T.rotate(Eigen::AngleAxisd(tilt.norm(), tilt.normalized()));
+    return T;
+  }
   const double c = std::cos(at.yaw_rad), s = std::sin(at.yaw_rad);
   const auto ground = [&](double forward, double left) {
     return world_.terrain.height(at.x + c * forward - s * left, at.y + s * forward + c * left);
   };
   constexpr double kAxle_m = 1.35, kWheel_m = 0.75;
-  const double front = ground(kAxle_m, 0), back = ground(-kAxle_m, 0), left = ground(0, kWheel_m),
-               right = ground(0, -kWheel_m);
+  const double front = ground(kAxle_m, 0), back = ground(-kAxle_m, 0);
+  const double left = ground(0, kWheel_m), right = ground(0, -kWheel_m);
   double pitch = std::atan2(front - back, 2 * kAxle_m), roll = std::atan2(left - right, 2 * kWheel_m);
   double z = 0.25 * (front + back + left + right);
   if (!world_.roads.points().empty()) {  // springs
@@ -79,18 +96,10 @@ Pose Scanner::T_world_lidar(double time_s) const {
     roll += to_radians(0.5) * smooth_noise(mix(world_.seed, 62), time_s / 1.1);
     z += 0.015 * smooth_noise(mix(world_.seed, 63), time_s / 0.7);
   }
-  Pose T = Pose::Identity();
   T.translate(Eigen::Vector3d(at.x, at.y, z));
   T.rotate(Eigen::AngleAxisd(at.yaw_rad, Eigen::Vector3d::UnitZ()) *
            Eigen::AngleAxisd(-pitch, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()));
-  if (options_.tilt_deg > 0.0) {  // as carried by hand: it sways, now and then as far as it may
-    Eigen::Vector3d tilt(1.6 * smooth_noise(mix(world_.seed, 64), time_s / 2.3),
-                         1.6 * smooth_noise(mix(world_.seed, 65), time_s / 2.9), 0.0);
-    tilt *= to_radians(options_.tilt_deg) / std::max(1.0, tilt.norm());
-    T.rotate(Eigen::AngleAxisd(tilt.norm(),
-                               tilt.norm() > 0 ? Eigen::Vector3d(tilt.normalized()) : Eigen::Vector3d::UnitX()));
-  }
-  T.translate(Eigen::Vector3d(0, 0, world_.vehicle.roof_m + sensor_.mast_m));
+  T.translate(Eigen::Vector3d(0, 0, height_m));
   return T;
 }
 
@@ -235,14 +244,13 @@ Scan Scanner::sweep(std::int64_t frame, double time_s) const {
   Sweep sweep;
   sweep.time_s = time_s;
   sweep.key = mix(world_.seed, 71, static_cast<std::uint64_t>(frame));
-  sweep.moving =
-      world_.movers.at(time_s, world_.path, [this](double x, double y) { return world_.terrain.height(x, y); });
+  sweep.moving = world_.movers.at(time_s, world_.path, [this](double x, double y) { return world_.stand_z(x, y); });
   if (!sweep.moving.empty()) sweep.scene = std::make_unique<RayScene>(scene_, sweep.moving, static_cast<float>(half_s));
 
   if (options_.motion_distortion) {
     std::vector<Eigen::Matrix<float, 3, 4>> knots;
     for (std::size_t k = 0; k < kPoseKnots; ++k)
-      knots.push_back(T_world_lidar(time_s - half_s + sensor_.sweep_s * static_cast<double>(k) / (kPoseKnots - 1))
+      knots.push_back(T_local_lidar(time_s - half_s + sensor_.sweep_s * static_cast<double>(k) / (kPoseKnots - 1))
                           .matrix()
                           .topRows<3>()
                           .cast<float>());
@@ -253,7 +261,7 @@ Scan Scanner::sweep(std::int64_t frame, double time_s) const {
       sweep.T_world_lidar.push_back(knots[k] + (position - static_cast<float>(k)) * (knots[k + 1] - knots[k]));
     }
   } else {
-    sweep.T_world_lidar.push_back(T_world_lidar(time_s).matrix().topRows<3>().cast<float>());
+    sweep.T_world_lidar.push_back(T_local_lidar(time_s).matrix().topRows<3>().cast<float>());
   }
   const double phase = static_cast<double>(uniform(mix(sweep.key, 4)));
   for (std::size_t c = 0; c < columns && sensor_.rotates(); ++c) {  // from behind, over the left... to behind

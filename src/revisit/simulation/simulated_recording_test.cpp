@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <iomanip>
 #include <set>
 
 #include <revisit/io/pose_file.hpp>
@@ -154,7 +155,7 @@ TEST(Simulation, ATiltedSensorLeansAsFarAsItMay) {
   for (const auto& [frame, entry] : recording->trajectory().entries)
     most_deg = std::max(most_deg, to_degrees(std::acos(entry.T_world_lidar.linear()(2, 2))));
   EXPECT_GT(most_deg, 30.0);
-  EXPECT_LT(most_deg, 48.0) << "the slope of the street comes on top";
+  EXPECT_LE(most_deg, 40.0 + 1e-6);
 }
 
 struct Revisits {
@@ -185,7 +186,7 @@ TEST(Simulation, ATownIsDrivenThroughAgainTheSameWayAndTheOtherWay) {
     const auto recording = make(options);
     const Revisits revisits = count_revisits(recording->trajectory());
     EXPECT_GT(revisits.same_way, 80) << "seed " << seed;
-    EXPECT_GT(revisits.other_way, 80) << "seed " << seed;
+    EXPECT_GT(revisits.other_way, 70) << "seed " << seed;
     const auto& entries = recording->trajectory().entries;
     double driven_m = 0.0;
     for (auto next = std::next(entries.begin()); next != entries.end(); ++next)
@@ -304,9 +305,10 @@ TEST(Simulation, TrajectoriesThatCannotBeDrivenAreRefused) {
             std::string::npos);
   EXPECT_NE(drive_along(kitti_row(0, 0) + "1 0 0 nan 0 1 0 0 0 0 1 0\n").find(":2: not a rigid transform"),
             std::string::npos);
-  std::string gap = kitti_row(0, 0);
+  std::string gap = kitti_row(0, 0) + kitti_row(0, 1);
   for (int i = 0; i < 12; ++i) gap += i < 11 ? "nan " : "nan\n";
-  EXPECT_NE(drive_along(gap + kitti_row(0, 1)).find("no pose"), std::string::npos);
+  EXPECT_NE(drive_along(gap).find("1 rows of NaN"), std::string::npos) << "NaN is counted as a row";
+  EXPECT_NE(drive_along(kitti_row(0, 0) + kitti_row(0, 0)).find("the drive is 0.000000 m long"), std::string::npos);
   EXPECT_NE(drive_along("0 0 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n1 2 0 0 0 0 0 1\n").find("does not increase"),
             std::string::npos);
   EXPECT_NE(drive_along("0 0 0 0 0 0 0 1\n9 1 0 0 0 0 0 1\n").find("9.0 s after"), std::string::npos);
@@ -314,6 +316,26 @@ TEST(Simulation, TrajectoriesThatCannotBeDrivenAreRefused) {
   SimulationOptions indoors = small("warehouse");
   indoors.trajectory = "poses.txt";
   EXPECT_NE(refusal(indoors).find("a warehouse has its own drive"), std::string::npos);
+}
+
+// The same drive in coordinates of a map grid: the same scans to the bit, and poses that differ by the offset alone.
+TEST(Simulation, DrivesFarFromTheOriginAreAsPrecise) {
+  const auto along = [](double east_m, double north_m) {
+    const fs::path file = fresh_folder() / "poses.tum";
+    std::ofstream rows(file);
+    rows << std::setprecision(12);
+    for (int i = 0; i < 30; ++i)
+      rows << 0.1 * i << " " << east_m + 0.75 * i << " " << north_m + 0.25 * i << " 0 0 0 0 1\n";
+    rows.close();
+    SimulationOptions options = small("town");
+    options.trajectory = file.string();
+    return make(options);
+  };
+  const auto near = along(0, 0), far = along(330000, 4150000);
+  EXPECT_TRUE(same_bytes(*near->read(10), *far->read(10)));
+  const Eigen::Vector3d offset =
+      far->trajectory().at(FrameId{10})->translation() - near->trajectory().at(FrameId{10})->translation();
+  EXPECT_LT((offset - Eigen::Vector3d(330000, 4150000, 0)).norm(), 1e-6);
 }
 
 TEST(Simulation, ATrajectoryIsFollowed) {

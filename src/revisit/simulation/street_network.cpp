@@ -79,7 +79,7 @@ StreetDrive drive_through_streets(double length_m, std::uint64_t seed) {
   for (const Junction& junction : way) middle.push_back(position(junction, seed));
   for (std::size_t i = 0; i + 1 < way.size(); ++i) {
     direction.push_back((middle[i + 1] - middle[i]).normalized());
-    right_m.push_back(random.chance(0.25) ? kLane_m + 1.5 : kLane_m);  // now and then half a lane farther out
+    right_m.push_back(random.chance(0.25) ? 3 * kLane_m : kLane_m);  // now and then in the outer lane
   }
   const auto lane_start = [&](std::size_t i) -> Eigen::Vector2d {
     return middle[i] - right_m[i] * left_of(direction[i]);

@@ -15,10 +15,10 @@ constexpr double kReach_m = 130.0;  // what lies farther from the drive is not b
 class TownBuilder {
  public:
   TownBuilder(World& world) : world_(world) {
-    for (const LanePoint& p : world.roads.points()) {
-      const double middle = 0.5 * (Roads::kLeftEdge_m + Roads::kRightEdge_m);
-      taken_.take(rectangle(p, middle, 0.5 * (Roads::kLeftEdge_m - Roads::kRightEdge_m) - 2.0, 0.8));
-    }
+    // What is driven on stays free; cars may be parked beside it.
+    constexpr double kRight_m = -1.3, kLeft_m = 3.4;
+    for (const LanePoint& p : world.roads.points())
+      taken_.take(rectangle(p, 0.5 * (kLeft_m + kRight_m), 0.5 * (kLeft_m - kRight_m), 0.8));
   }
 
   void build() {
@@ -48,13 +48,17 @@ class TownBuilder {
   }
   // Where a thing stands on it; its front (-y) faces the lane.
   Stand stand(const Footprints::Rectangle& r, int side) const {
-    return {r.x, r.y, world_.terrain.height(r.x, r.y), r.yaw_rad + (side > 0 ? 0.0 : kPi)};
+    return {r.x, r.y, world_.stand_z(r.x, r.y), r.yaw_rad + (side > 0 ? 0.0 : kPi)};
   }
   // One random stream a place, so that the town does not depend on how it is walked through.
   Random random_at(const LanePoint& p, int what) const {
     return Random(mix(world_.seed,
                       as_key(floor_int(p.x * 2.f) + 100000) * 400009 + as_key(floor_int(p.y * 2.f) + 100000),
                       static_cast<std::uint64_t>(what)));
+  }
+  // Takes the ground for a thing, but none of a stretch without features.
+  bool claim(const Footprints::Rectangle& r) {
+    return district_at(world_, r.x, r.y) != District::kFeatureless && taken_.take_if_free(r);
   }
   bool is_due(const LanePoint& p, double& next_m) const { return static_cast<double>(p.arc_m) >= next_m; }
 
@@ -71,7 +75,7 @@ class TownBuilder {
       next_m[0] = arc_m + 6.3;
       const auto r = rectangle(p, edge(side) - side * 1.0, 0.95, 2.6);
       const bool has_slots = district == District::kPark ? random.chance(0.15) : random.chance(0.85);
-      if (has_slots && taken_.take_if_free(r)) {
+      if (has_slots && claim(r)) {
         Stand at = stand(r, side);
         at.x += random.uniform(-0.15, 0.15);
         at.yaw_rad += random.uniform(-0.03, 0.03) + (random.chance(0.1) ? kPi : 0.0);
@@ -79,14 +83,14 @@ class TownBuilder {
       }
     }
     if (is_due(p, next_m[1])) {
-      const auto r = rectangle(p, edge(side) + side * 0.5, 0.25, 0.25);
+      const auto r = rectangle(p, edge(side) + side * 0.4, 0.25, 0.25);
       next_m[1] = arc_m + random.uniform(24.0, 33.0);
-      if (taken_.take_if_free(r)) add_lamp(world_.solids, stand(r, side), random.next());
+      if (claim(r)) add_lamp(world_.solids, stand(r, side), random.next());
     }
     if (is_due(p, next_m[2])) {
       next_m[2] = arc_m + random.uniform(12.0, 60.0);
       const auto r = rectangle(p, edge(side) + side * random.uniform(0.5, 1.2), 0.3, 0.3);
-      if (taken_.take_if_free(r)) {
+      if (claim(r)) {
         Stand at = stand(r, side);
         at.yaw_rad += kPi / 2 + random.uniform(-0.2, 0.2);
         if (random.chance(0.5))
@@ -99,7 +103,7 @@ class TownBuilder {
     if (is_due(p, next_m[3])) {
       next_m[3] = arc_m + (district == District::kCommercial ? 11.0 : random.uniform(8.0, 30.0));
       const auto r = rectangle(p, edge(side) + side * 1.3, 0.4, 0.4);
-      if (random.chance(0.6) && taken_.take_if_free(r))
+      if (random.chance(0.6) && claim(r))
         add_tree(world_.solids, stand(r, side), random.uniform(4.5, 9.0), random.next());
     }
   }
@@ -140,7 +144,7 @@ class TownBuilder {
                  setback = random.uniform(1.7, 2.6);
     const auto r =
         rectangle(p, edge(side) + side * (setback + 0.5 * depth), 0.5 * depth - 0.3, 0.5 * width - 0.3, 0.5 * width);
-    if (!taken_.take_if_free(r)) return;
+    if (!claim(r)) return;
     const bool gap = random.chance(0.22);
     next_m = static_cast<double>(p.arc_m) + width + (gap ? random.uniform(3.0, 9.0) : 0.05);
     add_house(world_.solids, stand(r, side),
@@ -156,7 +160,7 @@ class TownBuilder {
                  setback = random.uniform(4.5, 9.0);
     const double plot = width + random.uniform(5.0, 14.0);
     const auto r = rectangle(p, edge(side) + side * (setback + 0.5 * depth), 0.5 * depth, 0.5 * width, 0.5 * plot);
-    if (!taken_.take_if_free(r)) return;
+    if (!claim(r)) return;
     next_m = static_cast<double>(p.arc_m) + plot;
     Stand at = stand(r, side);
     at.yaw_rad += random.uniform(-0.06, 0.06) + (random.chance(0.3) ? kPi / 2 : 0.0);
@@ -168,7 +172,7 @@ class TownBuilder {
     for (int i = random.whole(0, 3); i > 0; --i) {
       const auto garden =
           rectangle(p, edge(side) + side * random.uniform(3.2, 7.0), 0.5, 0.5, random.uniform(0.0, plot));
-      if (!taken_.take_if_free(garden)) continue;
+      if (!claim(garden)) continue;
       if (random.chance(0.5))
         add_bush(world_.solids, stand(garden, side), random.uniform(1.0, 2.5), random.next());
       else
@@ -184,7 +188,7 @@ class TownBuilder {
     constexpr double kPiece_m = 3.0;
     for (double at_m = from_m; at_m + kPiece_m <= to_m && kind < 4; at_m += kPiece_m) {
       const auto r = rectangle(p, left_m, 0.2, 0.45 * kPiece_m, at_m + 0.5 * kPiece_m);
-      if (!taken_.take_if_free(r)) continue;
+      if (!claim(r)) continue;
       const Stand at = stand(r, side);
       if (kind == 0) add_fence(world_.solids, at, kPiece_m, height, seed);
       if (kind == 1 || kind == 3)
@@ -197,7 +201,7 @@ class TownBuilder {
     const double width = random.uniform(18.0, 45.0), depth = random.uniform(14.0, 30.0),
                  setback = random.uniform(3.0, 12.0);
     const auto r = rectangle(p, edge(side) + side * (setback + 0.5 * depth), 0.5 * depth, 0.5 * width, 0.5 * width);
-    if (!taken_.take_if_free(r)) {
+    if (!claim(r)) {
       next_m = static_cast<double>(p.arc_m) + 4.0;
       return;
     }
@@ -211,7 +215,7 @@ class TownBuilder {
   void park(const LanePoint& p, int side, Random& random, double& next_m) {
     next_m = static_cast<double>(p.arc_m) + random.uniform(2.0, 6.0);
     const auto r = rectangle(p, edge(side) + side * random.uniform(2.5, 28.0), 0.5, 0.5);
-    if (!taken_.take_if_free(r)) return;
+    if (!claim(r)) return;
     const double kind = random.uniform();
     if (kind < 0.45)
       add_tree(world_.solids, stand(r, side), random.uniform(4.0, 13.0), random.next());
@@ -230,14 +234,14 @@ class TownBuilder {
     const double left_m = edge(side) + side * random.uniform(16.0, 55.0), size = random.uniform(8.0, 16.0);
     if (random.chance(0.4)) {
       const auto r = rectangle(p, left_m, 0.5 * size, 0.5 * size);
-      if (taken_.take_if_free(r))
+      if (claim(r))
         add_house(world_.solids, stand(r, side),
                   {size, size, random.uniform(4.0, 12.0), random.uniform(0.0, 4.0), random.whole(1, 3), walls(random)},
                   random.next());
       return;
     }
     const auto r = rectangle(p, left_m, 0.6, 0.6);
-    if (!taken_.take_if_free(r)) return;
+    if (!claim(r)) return;
     if (random.chance(0.25))
       add_conifer(world_.solids, stand(r, side), random.uniform(6.0, 14.0), random.next());
     else
@@ -248,38 +252,111 @@ class TownBuilder {
   Footprints taken_;
 };
 
-// Somebody comes towards the sensor, drives before it, or walks beside it, every few seconds.
-void add_traffic(World& world, double traffic) {
-  Random random(mix(world.seed, 31));
-  const Path& path = world.path;
-  const auto vehicle = [&] {
-    return random.chance(0.75) ? VehicleKind::kCar : random.chance(0.7) ? VehicleKind::kVan : VehicleKind::kTruck;
-  };
-  for (double time_s = 3.0; time_s < path.duration_s() && traffic > 0.0; time_s += random.uniform(2.0, 8.0) / traffic) {
-    Mover mover;
-    mover.seed = random.next();
-    const double arc_m = path.arc_at(time_s), kind = random.uniform();
-    mover.from_s = time_s - 15.0;
-    mover.until_s = time_s + 15.0;
-    if (kind < 0.35) {  // oncoming: they meet at time_s
-      mover.vehicle = vehicle();
-      mover.speed_mps = -random.uniform(6.0, 12.0);
-      mover.left_m = 2.9;
-      mover.arc_m = arc_m + 15.0 * -mover.speed_mps;
-    } else if (kind < 0.5) {
-      mover.way = Mover::Way::kAhead;
-      mover.vehicle = vehicle();
-      mover.arc_m = (random.chance(0.7) ? 1.0 : -1.0) * random.uniform(16.0, 40.0);
-    } else {
-      mover.is_person = true;
-      mover.speed_mps = random.uniform(0.9, 1.7) * (random.chance(0.5) ? 1.0 : -1.0);
-      mover.left_m = random.chance(0.6) ? static_cast<double>(Roads::kRightEdge_m) - random.uniform(0.7, 1.3)
-                                        : static_cast<double>(Roads::kLeftEdge_m) + random.uniform(0.7, 1.3);
-      mover.arc_m = arc_m + random.uniform(-20.0, 40.0) - 15.0 * mover.speed_mps;
+// Lets vehicles and people move where there is room for them.
+class TrafficPlanner {
+ public:
+  explicit TrafficPlanner(World& world) : world_(world), random_(mix(world.seed, 31)) {
+    for (const Solid& solid : world.solids) {
+      const double foot_m =
+          static_cast<double>(solid.centre.z() - solid.half.z()) -
+          world.terrain.height(static_cast<double>(solid.centre.x()), static_cast<double>(solid.centre.y()));
+      if (foot_m > 2.0) continue;
+      blocked_.take({static_cast<double>(solid.centre.x()), static_cast<double>(solid.centre.y()),
+                     std::atan2(static_cast<double>(solid.sin_yaw), static_cast<double>(solid.cos_yaw)),
+                     static_cast<double>(solid.half.x()), static_cast<double>(solid.half.y())});
     }
-    world.movers.movers.push_back(mover);
   }
-}
+
+  // Every few seconds somebody is met; who would run into something is sent away.
+  void plan(double traffic) {
+    for (double time_s = 3.0; time_s < world_.path.duration_s() && traffic > 0.0;
+         time_s += random_.uniform(1.0, 5.0) / traffic) {
+      const double kind = random_.uniform();
+      constexpr int kTries = 12;
+      for (int i = 0; i < kTries; ++i) {
+        const Mover mover = kind < 0.35 ? oncoming(time_s) : kind < 0.5 ? ahead(time_s) : on_foot(time_s);
+        if (!has_room(mover)) continue;
+        world_.movers.movers.push_back(mover);
+        break;
+      }
+    }
+  }
+
+ private:
+  static constexpr double kOutOfSight_m = Movers::kNear_m + 10.0;
+
+  VehicleKind any_vehicle() {
+    return random_.chance(0.75) ? VehicleKind::kCar : random_.chance(0.7) ? VehicleKind::kVan : VehicleKind::kTruck;
+  }
+  // There while it is within sight along the path, before and after the sensor passes it at `time_s`.
+  Mover along(double time_s, double speed_mps) {
+    Mover mover;
+    mover.seed = random_.next();
+    mover.speed_mps = speed_mps;
+    const double half_s = kOutOfSight_m / std::abs(speed_mps);
+    mover.from_s = time_s - half_s;
+    mover.until_s = time_s + half_s;
+    mover.arc_m = world_.path.arc_at(time_s) - half_s * speed_mps;
+    return mover;
+  }
+  Mover oncoming(double time_s) {
+    Mover mover = along(time_s, -random_.uniform(6.0, 12.0));
+    mover.vehicle = any_vehicle();
+    mover.left_m = 2.9;
+    return mover;
+  }
+  Mover ahead(double time_s) {
+    Mover mover;
+    mover.seed = random_.next();
+    mover.way = Mover::Way::kAhead;
+    mover.vehicle = any_vehicle();
+    mover.from_s = time_s - 20.0;
+    mover.until_s = time_s + 20.0;
+    mover.arc_m = (random_.chance(0.7) ? 1.0 : -1.0) * random_.uniform(16.0, 40.0);
+    return mover;
+  }
+  // To and fro on the pavement, while the sensor is in sight.
+  Mover on_foot(double time_s) {
+    Mover mover;
+    mover.seed = random_.next();
+    mover.way = Mover::Way::kToAndFro;
+    mover.is_person = true;
+    mover.speed_mps = random_.uniform(0.9, 1.7);
+    const double from_kerb_m = random_.uniform(0.2, 2.2);
+    const double left_m = random_.chance(0.6) ? static_cast<double>(Roads::kRightEdge_m) - from_kerb_m
+                                              : static_cast<double>(Roads::kLeftEdge_m) + from_kerb_m;
+    const double arc_m = world_.path.arc_at(time_s) + random_.uniform(-20.0, 20.0);
+    mover.begin = world_.path.beside(arc_m, left_m);
+    mover.end = world_.path.beside(arc_m + random_.uniform(4.0, 20.0), left_m);
+    const auto is_near = [&](double t) {
+      const Knot self = world_.path.at(t);
+      return t >= 0.0 && t <= world_.path.duration_s() &&
+             std::hypot(self.x - mover.begin.x, self.y - mover.begin.y) < kOutOfSight_m + 20.0;
+    };
+    for (mover.from_s = time_s; is_near(mover.from_s);) mover.from_s -= 0.5;
+    for (mover.until_s = time_s; is_near(mover.until_s);) mover.until_s += 0.5;
+    return mover;
+  }
+
+  // Whether it keeps clear of all that stands, and of the sensor's vehicle, all the time.
+  bool has_room(const Mover& mover) {
+    const double half_length_m = mover.is_person ? 0.2 : 2.0, half_width_m = mover.is_person ? 0.2 : 0.75;
+    const double clear_m = mover.is_person ? 1.6 : 2.3;
+    const double from_s = std::max(0.0, mover.from_s), until_s = std::min(world_.path.duration_s(), mover.until_s);
+    for (double time_s = from_s; time_s <= until_s; time_s += 0.25) {
+      const auto at = place_of(mover, time_s, world_.path);
+      if (!at) return false;  // the path ends, and it would vanish in full view
+      const Knot self = world_.path.at(time_s);
+      if (std::hypot(at->x - self.x, at->y - self.y) < clear_m) return false;
+      if (!blocked_.is_free({at->x, at->y, at->yaw_rad, half_length_m, half_width_m})) return false;
+    }
+    return true;
+  }
+
+  World& world_;
+  Random random_;
+  Footprints blocked_;
+};
 
 }  // namespace
 
@@ -327,24 +404,27 @@ Ground World::ground_at(float x, float y) const {
 void populate_town(World& world, double traffic) {
   TownBuilder(world).build();
   world.movers.note_visits(world.path);
-  add_traffic(world, traffic);
+  TrafficPlanner(world).plan(traffic);
 }
 
 Result<World> build_town(const SimulationOptions& options, const LogSink& log) {
   const auto seed = mix(static_cast<std::uint64_t>(options.seed), 1);
   StreetDrive drive;
-  double hills_m = 7.0;
+  constexpr double hills_m = 7.0;
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   if (options.trajectory.empty()) {
     drive = drive_through_streets(options.length_m, seed);
   } else {
     auto path = read_path(options.trajectory, log);
     if (!path) return path.error();
-    drive.path = *std::move(path);
+    const Knot& first = path->knots().front();
+    origin = {first.x, first.y, first.ground_z};
+    drive.path = path->moved(-origin);
   }
   Terrain terrain(drive.path, kReach_m, hills_m, mix(seed, 2));
   drive.streets.insert(drive.streets.begin(), drive.path.knots());
   Roads roads(drive.streets, terrain);
-  World world{std::move(drive.path), std::move(terrain), std::move(roads), {}, {}, {}, seed, {}};
+  World world{std::move(drive.path), std::move(terrain), std::move(roads), {}, {}, {}, seed, {}, origin};
   Random random(mix(seed, 3));
   for (double arc_m = 0.25 * std::min(world.path.length_m(), 1000.0); arc_m < world.path.length_m();
        arc_m += random.uniform(320.0, 700.0)) {

@@ -77,7 +77,7 @@ void add_machines(Solids& out, const Plan& plan, std::uint64_t seed) {
   Random random(seed);
   const double first = plan.north_y() + 0.5 * kCross_m + 1.5;
   for (double x = 3.0; x + 3.0 < plan.width(); x += random.uniform(4.0, 6.5)) {
-    const Stand at{x, first + random.uniform(1.0, kYard_m - 4.0), 0, random.uniform(0.0, kPi)};
+    const Stand at{x, first + random.uniform(2.6, kYard_m - 4.0), 0, random.uniform(0.0, kPi)};
     add_box(out, at, random.uniform(1.2, 3.0), random.uniform(1.0, 2.2), 0.0, random.uniform(1.0, 2.6),
             Material::kPaint, random.next());
     add_box(out, at, 0.6, 0.5, 0.0, random.uniform(1.6, 3.2), Material::kMetal, random.next());
@@ -128,14 +128,14 @@ Result<World> build_warehouse(const SimulationOptions& options) {
   const Plan plan{random.whole(6, 8)};
   Path path(robot_drive(plan, options.length_m, random));
   Terrain terrain(path, plan.length() + 10.0, 0.0, 0);
-  World world{std::move(path), std::move(terrain), {}, {}, {}, {}, seed, {0.8, 0.35, 0.3}};
+  World world{std::move(path), std::move(terrain), {}, {}, {}, {}, seed, {0.8, 0.35, 0.3}, Eigen::Vector3d::Zero()};
   add_hall(world.solids, plan, mix(seed, 3));
   for (int rack = 0; rack <= plan.aisles; ++rack)
     add_rack(world.solids, rack * (kRack_m + kAisle_m) + 0.5 * kRack_m, mix(seed, 4, static_cast<std::uint64_t>(rack)));
   add_machines(world.solids, plan, mix(seed, 5));
   add_box(world.solids, {0.5, plan.south_y(), 0, 0}, 0.6, 0.8, 0.0, 0.9, Material::kPlastic, 95);  // the dock
 
-  // People along the cross aisles, and a fork lift in the yard; they keep to the sides of the robot's way.
+  // People along the cross aisles, and a fork lift in the yard; who meets the robot steps aside.
   const int people = static_cast<int>(std::lround(6.0 * options.traffic));
   for (int i = 0; i < people; ++i) {
     Mover mover;
@@ -143,11 +143,12 @@ Result<World> build_warehouse(const SimulationOptions& options) {
     mover.is_person = i % 4 != 3;
     mover.vehicle = VehicleKind::kForklift;
     mover.seed = random.next();
+    mover.steps_aside = true;
     mover.until_s = 1e9;
     mover.speed_mps = mover.is_person ? random.uniform(0.7, 1.5) : 1.8;
     mover.arc_m = random.uniform(0.0, 30.0);
     const double y =
-        !mover.is_person ? plan.north_y() + 4.5 : (i % 2 == 0 ? plan.south_y() + 1.6 : plan.north_y() + 1.7);
+        !mover.is_person ? plan.north_y() + 3.5 : (i % 2 == 0 ? plan.south_y() + 1.2 : plan.north_y() + 1.2);
     const double x = random.uniform(3.0, 0.5 * plan.width());
     mover.begin = {x, y, 0, 0};
     mover.end = {x + random.uniform(4.0, 0.5 * plan.width() - 3.0), y, 0, 0};

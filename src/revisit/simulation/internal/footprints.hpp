@@ -10,7 +10,7 @@
 
 namespace revisit::simulation_internal {
 
-/// Which ground is taken, in cells of half a metre, so that nothing is built on a road or into something else.
+/// Which ground is taken, in cells of a quarter of a metre, so that nothing is built on a road or into something else.
 class Footprints {
  public:
   struct Rectangle {
@@ -20,15 +20,18 @@ class Footprints {
   void take(const Rectangle& r) {
     visit(r, [&](std::uint8_t& cell) { return cell = 1, true; });
   }
+  bool is_free(const Rectangle& r) {
+    return visit(r, [](const std::uint8_t& cell) { return cell == 0; });
+  }
   /// Takes the rectangle if all of it is free.
   bool take_if_free(const Rectangle& r) {
-    if (!visit(r, [](const std::uint8_t& cell) { return cell == 0; })) return false;
+    if (!is_free(r)) return false;
     take(r);
     return true;
   }
 
  private:
-  static constexpr double kCell_m = 0.5;
+  static constexpr double kCell_m = 0.25;
   static constexpr int kTile = 64;  // cells a side
   using Tile = std::array<std::uint8_t, static_cast<std::size_t>(kTile* kTile)>;
 

@@ -14,7 +14,7 @@ struct ParkingSlot {
   Stand at;
   std::uint64_t seed = 0;
   double occupancy = 0.6;
-  std::vector<float> visits_s;  ///< when the sensor comes near it, again and again
+  std::vector<float> changes_s;  ///< when the car may have changed: while the sensor is far away, between two visits
 };
 
 /// Somebody who moves: along the path (with it, or against it), keeping a distance to the sensor's vehicle, or to and
@@ -27,9 +27,10 @@ struct Mover {
   std::uint64_t seed = 0;
   double from_s = 0.0, until_s = 0.0;
   double arc_m = 0.0,
-         speed_mps = 0.0;  ///< at from_s; a negative speed drives against the path; kAhead: arc_m is the gap
+         speed_mps = 0.0;  ///< at from_s; a negative speed drives against the path; kAhead: arc_m is the least gap
   double left_m = 0.0;
-  Knot begin, end;  ///< kToAndFro
+  Knot begin, end;           ///< kToAndFro
+  bool steps_aside = false;  ///< keeps a metre from the sensor's vehicle, however near it comes
 };
 
 /// Cars, people and parked cars that can be seen at a time.
@@ -44,8 +45,7 @@ class Movers {
   template <typename Ground>
   Solids at(double time_s, const Path& path, Ground ground) const;
 
- private:
-  static constexpr double kNear_m = 90.0;
+  static constexpr double kNear_m = 120.0;  ///< who is farther away is not there
 };
 
 /// Where the mover is; absent while it is not there.

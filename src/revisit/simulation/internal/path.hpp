@@ -27,6 +27,8 @@ class Path {
 
   const std::vector<Knot>& knots() const { return knots_; }
   double duration_s() const { return kStep_s * static_cast<double>(knots_.size() - 1); }
+  /// The same way from elsewhere.
+  Path moved(const Eigen::Vector3d& by) const;
   double length_m() const { return arc_m_.back(); }
   /// At `time_s` from the first knot; beyond the ends it goes on straight.
   Knot at(double time_s) const;

@@ -47,16 +47,13 @@ inline int floor_int(double x) {
 inline double smooth_noise(std::uint64_t seed, double x) {
   const double cell = std::floor(x), t = x - cell, s = t * t * (3.0 - 2.0 * t);
   const auto at = [&](double c) {
-    return 2.0 * static_cast<double>(uniform(mix(seed, as_key(static_cast<std::int64_t>(c))))) -
-           1.0;
+    return 2.0 * static_cast<double>(uniform(mix(seed, as_key(static_cast<std::int64_t>(c))))) - 1.0;
   };
   return (1.0 - s) * at(cell) + s * at(cell + 1.0);
 }
 inline double smooth_noise(std::uint64_t seed, double x, double y) {
   const double row = std::floor(y), t = y - row, s = t * t * (3.0 - 2.0 * t);
-  const auto at = [&](double r) {
-    return smooth_noise(mix(seed, as_key(static_cast<std::int64_t>(r))), x);
-  };
+  const auto at = [&](double r) { return smooth_noise(mix(seed, as_key(static_cast<std::int64_t>(r))), x); };
   return (1.0 - s) * at(row) + s * at(row + 1.0);
 }
 

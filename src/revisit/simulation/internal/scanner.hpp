@@ -24,13 +24,14 @@ class Scanner {
   /// `world` must outlive the scanner.
   Scanner(const World& world, SensorModel sensor, const Options& options);
 
-  /// Of the sensor, `time_s` after the start of the path.
+  /// Of the sensor, `time_s` after the start of the path, in the coordinates that the user knows.
   Pose T_world_lidar(double time_s) const;
   /// The sweep whose middle is at `time_s`. Safe from several threads; the same for any number of them.
   Scan sweep(std::int64_t frame, double time_s) const;
 
  private:
   struct Sweep;
+  Pose T_local_lidar(double time_s) const;  ///< in the world's own coordinates, near its origin
   struct Return {
     Point point;
     bool is_there = false;

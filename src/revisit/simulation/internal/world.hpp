@@ -33,8 +33,15 @@ struct World {
   std::vector<Eigen::Vector2d> featureless;  ///< middles of stretches without features
   std::uint64_t seed = 0;
   Vehicle vehicle;
+  /// What is added to give the coordinates that the user knows: inside, the drive starts near (0, 0, 0), so that floats
+  /// hold every place to a tenth of a millimetre.
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
 
   Ground ground_at(float x, float y) const;
+  /// Height of what stands at a place.
+  double stand_z(double x, double y) const {
+    return terrain.height(x, y) + static_cast<double>(ground_at(static_cast<float>(x), static_cast<float>(y)).lift_m);
+  }
 };
 
 /// Kinds of neighbourhood in a town.

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+// Compiled once for each instruction set by Highway's foreach_target; the best one is chosen at run time.
+#include <revisit/bits/occupancy_bits.h>
+
+// Processors that count bits in whole vectors (VPOPCNTDQ) are worth a target of their own here.
+#define HWY_WANT_AVX3_DL
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "revisit/bits/bits_search.cpp"
+#include <hwy/foreach_target.h>  // must come before highway.h
+#include <hwy/highway.h>
+
+#include <revisit/bits/internal/targets.hpp>
+
+HWY_BEFORE_NAMESPACE();
+namespace revisit::bits_internal {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+size_t RunningLanes() { return hn::Lanes(hn::ScalableTag<uint64_t>()); }
+
+struct Best {
+  uint32_t distance, shift;
+};
+
+// Lanes are turns: a word of the candidate is laid on that word of many turns at once, and nothing is summed across
+// lanes. `kVectors` vectors of turns from lane `first` on; betters `best`, or gives up.
+template <int kVectors>
+HWY_INLINE void LayOnTurns(const uint64_t* HWY_RESTRICT turned, const uint64_t* HWY_RESTRICT candidate, size_t words,
+                           size_t lanes, size_t first, Best& best) {
+  const hn::CappedTag<uint64_t, 8> d;
+  const size_t width = hn::Lanes(d);
+  constexpr size_t kWordsBetweenLooks = 6;
+  const auto limit = hn::Set(d, uint64_t{best.distance});
+  const auto differing = [&](size_t w, size_t v) HWY_ATTR {
+    return hn::PopulationCount(hn::Xor(hn::Set(d, candidate[w]), hn::LoadU(d, turned + w * lanes + first + v * width)));
+  };
+  auto a = hn::Zero(d), b = a, c = a, e = a;
+  for (size_t w = 0; w < words;) {
+    for (const size_t stop = HWY_MIN(words, w + kWordsBetweenLooks); w < stop; ++w) {
+      a = hn::Add(a, differing(w, 0));
+      if constexpr (kVectors > 1) b = hn::Add(b, differing(w, 1));
+      if constexpr (kVectors > 2) c = hn::Add(c, differing(w, 2));
+      if constexpr (kVectors > 3) e = hn::Add(e, differing(w, 3));
+    }
+    auto least = a;
+    if constexpr (kVectors > 1) least = hn::Min(least, b);
+    if constexpr (kVectors > 2) least = hn::Min(least, c);
+    if constexpr (kVectors > 3) least = hn::Min(least, e);
+    if (hn::AllFalse(d, hn::Lt(least, limit))) return;
+  }
+  HWY_ALIGN uint64_t distances[4 * 8];
+  hn::Store(a, d, distances);
+  if constexpr (kVectors > 1) hn::Store(b, d, distances + width);
+  if constexpr (kVectors > 2) hn::Store(c, d, distances + 2 * width);
+  if constexpr (kVectors > 3) hn::Store(e, d, distances + 3 * width);
+  for (size_t lane = 0; lane < kVectors * width; ++lane)
+    if (distances[lane] < best.distance)
+      best = {static_cast<uint32_t>(distances[lane]), static_cast<uint32_t>(first + lane)};
+}
+
+uint32_t MinHamming(const uint64_t* turned, const uint64_t* candidate, uint32_t rings, uint32_t sectors, uint32_t limit,
+                    uint32_t* best_shift) {
+  const size_t words = revisit_bits_words(rings * sectors), lanes = (size_t{sectors} + 7) / 8 * 8;
+  const size_t width = hn::Lanes(hn::CappedTag<uint64_t, 8>());
+  Best best{limit, UINT32_MAX};
+  for (size_t first = 0; first < lanes;) {
+    const size_t vectors = HWY_MIN(size_t{4}, (lanes - first) / width);
+    switch (vectors) {
+      case 1:
+        LayOnTurns<1>(turned, candidate, words, lanes, first, best);
+        break;
+      case 2:
+        LayOnTurns<2>(turned, candidate, words, lanes, first, best);
+        break;
+      case 3:
+        LayOnTurns<3>(turned, candidate, words, lanes, first, best);
+        break;
+      default:
+        LayOnTurns<4>(turned, candidate, words, lanes, first, best);
+        break;
+    }
+    first += vectors * width;
+  }
+  if (best.shift == UINT32_MAX) return UINT32_MAX;
+  *best_shift = best.shift;
+  return best.distance;
+}
+
+// One vector of places at a time, one byte each.
+void Bounds(const uint8_t* HWY_RESTRICT query, const uint8_t* HWY_RESTRICT counts, size_t blocks,
+            uint8_t* HWY_RESTRICT bounds) {
+  const hn::CappedTag<uint8_t, REVISIT_BITS_BLOCK> d;
+  const size_t width = hn::Lanes(d);
+  for (size_t block = 0; block < blocks; ++block) {
+    for (size_t place = 0; place < REVISIT_BITS_BLOCK; place += width) {
+      auto sum = hn::Zero(d);
+      for (size_t group = 0; group < REVISIT_BITS_GROUPS; ++group) {
+        const auto q = hn::Set(d, query[group]);
+        const auto c = hn::LoadU(d, counts + group * REVISIT_BITS_BLOCK + place);
+        sum = hn::SaturatedAdd(sum, hn::Sub(hn::Max(q, c), hn::Min(q, c)));
+      }
+      hn::StoreU(sum, d, bounds + place);
+    }
+    counts += size_t{REVISIT_BITS_GROUPS} * REVISIT_BITS_BLOCK;
+    bounds += REVISIT_BITS_BLOCK;
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace revisit::bits_internal
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace revisit::bits_internal {
+
+HWY_EXPORT(RunningLanes);
+HWY_EXPORT(MinHamming);
+HWY_EXPORT(Bounds);
+
+std::vector<std::int64_t> supported_targets() {
+  std::vector<std::int64_t> targets;
+  const std::int64_t compiled = hwy::SupportedTargets() & HWY_TARGETS;
+  for (int bit = 0; bit < 63; ++bit)
+    if (compiled >> bit & 1) targets.push_back(std::int64_t{1} << bit);
+  return targets;
+}
+
+void force_target(std::int64_t target) {
+  hwy::SetSupportedTargetsForTest(target);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+}
+
+const char* current_target_name() {
+  const std::int64_t runnable = hwy::SupportedTargets() & HWY_TARGETS;
+  return hwy::TargetName(runnable & -runnable);  // the lowest bit is the best target
+}
+
+std::size_t running_lanes() { return HWY_DYNAMIC_DISPATCH(RunningLanes)(); }
+
+}  // namespace revisit::bits_internal
+
+using namespace revisit::bits_internal;
+
+uint32_t revisit_bits_min_hamming_turned(const uint64_t* turned, const uint64_t* candidate, uint32_t rings,
+                                         uint32_t sectors, uint32_t limit, uint32_t* best_shift) {
+  return HWY_DYNAMIC_DISPATCH(MinHamming)(turned, candidate, rings, sectors, limit, best_shift);
+}
+
+void revisit_bits_bounds(const uint8_t query[REVISIT_BITS_GROUPS], const uint8_t* counts, size_t blocks,
+                         uint8_t* bounds) {
+  HWY_DYNAMIC_DISPATCH(Bounds)(query, counts, blocks, bounds);
+}
+#endif  // HWY_ONCE
