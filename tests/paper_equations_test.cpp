@@ -145,7 +145,9 @@ TEST(PaperEquations, TemporalConsistencyIsThePrintedMean) {
     past[FrameId{frame}] = describe(points, {});
     page[FrameId{frame}] = describe_by_the_page(points, 60, 20, 50.0);
   }
-  const DescriptorLookup lookup = [&](FrameId frame) { return past.contains(frame) ? &past.at(frame) : nullptr; };
+  const DescriptorLookup lookup = [&](FrameId frame) {
+    return past.contains(frame) ? std::optional<DescriptorView>(past.at(frame)) : std::nullopt;
+  };
   const int m = 25, n = 13, N = 5;
   for (const int direction : {1, -1}) {  // decided: a reverse visit runs the candidate's index the other way
     double sum = 0.0;

@@ -30,6 +30,19 @@ struct IntensityScanContext {
   int occupied_cells() const;
 };
 
+/// A descriptor that lies elsewhere, in an index for instance.
+struct DescriptorView {
+  int rings = 0, sectors = 0;
+  const std::uint8_t* intensity = nullptr;   ///< [sector * rings + ring]
+  const std::uint64_t* occupancy = nullptr;  ///< as in IntensityScanContext
+
+  DescriptorView(int n_r, int n_s, const std::uint8_t* intensities, const std::uint64_t* image)
+      : rings(n_r), sectors(n_s), intensity(intensities), occupancy(image) {}
+  DescriptorView(const IntensityScanContext& of)
+      : DescriptorView(of.rings, of.sectors, of.intensity.data(), of.occupancy.data()) {}
+  std::size_t cells() const { return static_cast<std::size_t>(rings) * static_cast<std::size_t>(sectors); }
+};
+
 /// The 8-bit form of an intensity in [0, 1]; values outside are cut, NaN is 0.
 std::uint8_t quantise_intensity(float intensity);
 

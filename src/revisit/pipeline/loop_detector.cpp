@@ -103,10 +103,11 @@ Detection LoopDetector::detect(const PreparedScan& prepared, const std::optional
 }
 
 void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
-  const auto query_descriptor = [&](FrameId frame) -> const IntensityScanContext* {
+  const auto query_descriptor = [&](FrameId frame) -> std::optional<DescriptorView> {
     const auto found = std::find_if(recent_queries_.begin(), recent_queries_.end(),
                                     [&](const auto& each) { return each.first == frame; });
-    return found == recent_queries_.end() ? nullptr : &found->second;
+    if (found == recent_queries_.end()) return std::nullopt;
+    return found->second;
   };
   const auto match_descriptor = [&](FrameId frame) { return index_.find(frame); };
   const auto count = std::min(detection.candidates.size(), static_cast<std::size_t>(parameters_.geometric.candidates));

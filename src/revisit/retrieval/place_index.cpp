@@ -2,10 +2,11 @@
 #include <revisit/retrieval/place_index.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
-#include <string>
 
 #include <revisit/descriptors/similarity.hpp>
+#include <revisit/retrieval/internal/nearest_images.hpp>
 
 namespace revisit {
 namespace {
@@ -13,68 +14,84 @@ namespace {
 // A hair of tolerance, so that "30 s before" holds for times that were rounded to microseconds.
 constexpr double kTimeTolerance_s = 1e-6;
 
+double geometry_score(std::uint32_t distance, std::size_t cells) {
+  return 1.0 - static_cast<double>(distance) / static_cast<double>(cells);
+}
+
+// The largest distance whose score passes.
+std::uint32_t farthest_distance(double min_score, std::size_t cells) {
+  auto distance = static_cast<std::uint32_t>((1.0 - min_score) * static_cast<double>(cells));
+  while (distance < cells && geometry_score(distance + 1, cells) >= min_score) ++distance;
+  while (distance > 0 && geometry_score(distance, cells) < min_score) --distance;
+  return distance;
+}
+
+// How many of the first `size` places pass a test that, once failed, fails for all later ones.
+template <typename Test>
+std::size_t prefix(std::size_t size, Test passes) {
+  std::size_t begin = 0, end = size;
+  while (begin < end) {
+    const std::size_t middle = begin + (end - begin) / 2;
+    passes(middle) ? begin = middle + 1 : end = middle;
+  }
+  return begin;
+}
+
 }  // namespace
 
-void PlaceIndex::add(FrameId frame, double stamp_s, IntensityScanContext descriptor) {
-  if (!places_.empty()) {
-    if (frame <= places_.back().frame)
-      throw std::invalid_argument("frame " + std::to_string(frame.value) + " after frame " +
-                                  std::to_string(places_.back().frame.value) + ": frames must increase");
-    const IntensityScanContext& first = places_.front().descriptor;
-    if (descriptor.rings != first.rings || descriptor.sectors != first.sectors)
-      throw std::invalid_argument("descriptors of one index must have one grid");
-  }
-  places_.push_back({frame, stamp_s, std::move(descriptor)});
+struct PlaceIndex::Store : retrieval_internal::PlaceStore {};
+
+PlaceIndex::PlaceIndex(const RetrievalOptions& options) : options_(options), store_(std::make_unique<Store>()) {}
+PlaceIndex::~PlaceIndex() = default;
+PlaceIndex::PlaceIndex(PlaceIndex&&) noexcept = default;
+PlaceIndex& PlaceIndex::operator=(PlaceIndex&&) noexcept = default;
+
+void PlaceIndex::add(FrameId frame, double stamp_s, const IntensityScanContext& descriptor) {
+  store_->add(frame, stamp_s, descriptor);
 }
 
-bool PlaceIndex::may_match(const Place& place, FrameId frame, double stamp_s) const {
-  return frame.value - place.frame.value >= options_.exclude_frames &&
-         stamp_s - place.stamp_s >= options_.exclude_s - kTimeTolerance_s;
+std::size_t PlaceIndex::size() const { return store_->size(); }
+
+// Frames increase and latest stamps do not decrease: the allowed past is the beginning of the index.
+std::size_t PlaceIndex::old_enough(FrameId frame, double stamp_s) const {
+  return prefix(store_->size(), [&](std::size_t i) {
+    return frame.value - store_->frame(i).value >= options_.exclude_frames &&
+           stamp_s - store_->latest_s(i) >= options_.exclude_s - kTimeTolerance_s;
+  });
 }
 
-bool PlaceIndex::has_searchable_past(FrameId frame, double stamp_s) const {
-  return std::any_of(places_.begin(), places_.end(),
-                     [&](const Place& place) { return may_match(place, frame, stamp_s); });
+bool PlaceIndex::has_searchable_past(FrameId frame, double stamp_s) const { return old_enough(frame, stamp_s) > 0; }
+
+std::vector<LoopCandidate> PlaceIndex::search(FrameId frame, double stamp_s, const IntensityScanContext& query,
+                                              int threads, SearchEffort* effort) const {
+  return rank(old_enough(frame, stamp_s), query, threads, effort);
 }
 
-std::vector<LoopCandidate> PlaceIndex::search(FrameId frame, double stamp_s, const IntensityScanContext& query) const {
-  std::vector<const Place*> allowed;
-  for (const Place& place : places_)
-    if (may_match(place, frame, stamp_s)) allowed.push_back(&place);
-  return rank(allowed, query);
+std::vector<LoopCandidate> PlaceIndex::search_all(const IntensityScanContext& query, int threads,
+                                                  SearchEffort* effort) const {
+  return rank(store_->size(), query, threads, effort);
 }
 
-std::vector<LoopCandidate> PlaceIndex::search_all(const IntensityScanContext& query) const {
-  std::vector<const Place*> all;
-  for (const Place& place : places_) all.push_back(&place);
-  return rank(all, query);
-}
+std::vector<LoopCandidate> PlaceIndex::rank(std::size_t places, const IntensityScanContext& query, int threads,
+                                            SearchEffort* effort) const {
+  if (places > 0 && (query.rings != store_->rings() || query.sectors != store_->sectors()))
+    throw std::invalid_argument("descriptors of different grids cannot be compared");
+  const auto shortlist = options_.shortlist == 0 ? places : static_cast<std::size_t>(options_.shortlist);
+  retrieval_internal::SearchCounts counts;
+  const auto near = retrieval_internal::nearest_images(*store_, places, query.occupancy.data(), shortlist,
+                                                       farthest_distance(options_.min_geometry_score, query.cells()),
+                                                       threads, &counts);
+  if (effort != nullptr) *effort = {counts.places, counts.compared};
 
-std::vector<LoopCandidate> PlaceIndex::rank(const std::vector<const Place*>& places,
-                                            const IntensityScanContext& query) const {
-  struct Geometry {
-    const Place* place;
-    GeometryMatch match;
-  };
-  std::vector<Geometry> shortlist;
-  for (const Place* place : places) {
-    const GeometryMatch match = match_geometry(query, place->descriptor);
-    if (match.score >= options_.min_geometry_score) shortlist.push_back({place, match});
-  }
-  const auto limit = static_cast<std::size_t>(options_.shortlist);
-  if (limit != 0 && shortlist.size() > limit) {
-    std::stable_sort(shortlist.begin(), shortlist.end(),
-                     [](const Geometry& a, const Geometry& b) { return a.match.score > b.match.score; });
-    shortlist.resize(limit);
-  }
   std::vector<LoopCandidate> candidates;
-  for (const Geometry& each : shortlist) {
+  candidates.reserve(near.size());
+  for (const auto& each : near) {
     LoopCandidate candidate;
-    candidate.match = each.place->frame;
-    candidate.geometry_score = each.match.score;
-    candidate.shift_columns = each.match.shift_columns;
-    candidate.yaw_rad = yaw_of_shift(each.match.shift_columns, query.sectors);
-    candidate.intensity_score = match_intensity(query, each.place->descriptor, each.match.shift_columns);
+    candidate.match = store_->frame(each.place);
+    candidate.geometry_score = geometry_score(each.distance, query.cells());
+    candidate.shift_columns = static_cast<int>(each.shift);
+    candidate.yaw_rad = yaw_of_shift(candidate.shift_columns, query.sectors);
+    candidate.intensity_score = match_intensity(query, store_->descriptor(each.place), candidate.shift_columns);
     if (candidate.intensity_score >= options_.min_intensity_score) candidates.push_back(candidate);
   }
   std::sort(candidates.begin(), candidates.end(), [](const LoopCandidate& a, const LoopCandidate& b) {
@@ -84,10 +101,11 @@ std::vector<LoopCandidate> PlaceIndex::rank(const std::vector<const Place*>& pla
   return candidates;
 }
 
-const IntensityScanContext* PlaceIndex::find(FrameId frame) const {
-  const auto place = std::lower_bound(places_.begin(), places_.end(), frame,
-                                      [](const Place& each, FrameId id) { return each.frame < id; });
-  return place != places_.end() && place->frame == frame ? &place->descriptor : nullptr;
+std::optional<DescriptorView> PlaceIndex::find(FrameId frame) const {
+  const std::size_t size = store_->size();
+  const std::size_t i = prefix(size, [&](std::size_t at) { return store_->frame(at) < frame; });
+  if (i == size || store_->frame(i) != frame) return std::nullopt;
+  return store_->descriptor(i);
 }
 
 }  // namespace revisit

@@ -86,8 +86,9 @@ TEST(PlaceIndex, MisuseThrows) {
   DescriptorOptions other;
   other.rings = 5;
   EXPECT_THROW(index.add(FrameId{9}, 1.0, describe({}, other)), std::invalid_argument);
-  EXPECT_EQ(index.find(FrameId{9}), nullptr);
-  EXPECT_NE(index.find(FrameId{2}), nullptr);
+  EXPECT_FALSE(index.find(FrameId{9}));
+  ASSERT_TRUE(index.find(FrameId{2}));
+  EXPECT_EQ(index.find(FrameId{2})->occupancy[0], random_context(2).occupancy[0]);
 }
 
 }  // namespace

@@ -18,9 +18,9 @@ Mean mean_score(FrameId query, FrameId match, int direction, const DescriptorLoo
                 const DescriptorLookup& match_descriptor, int frames) {
   Mean mean;
   for (int k = 1; k <= frames; ++k) {
-    const IntensityScanContext* q = query_descriptor(FrameId{query.value - k});
-    const IntensityScanContext* m = match_descriptor(FrameId{match.value - std::int64_t{direction} * k});
-    if (q == nullptr || m == nullptr) continue;
+    const auto q = query_descriptor(FrameId{query.value - k});
+    const auto m = match_descriptor(FrameId{match.value - std::int64_t{direction} * k});
+    if (!q || !m) continue;
     mean.sum += match_descriptors(*q, *m).score();
     ++mean.pairs;
   }

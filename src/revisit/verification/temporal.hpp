@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include <revisit/config/parameters.hpp>
@@ -21,8 +22,8 @@ struct TemporalEvidence {
   std::string reason;  ///< why not consistent
 };
 
-/// The descriptor of a frame, nullptr where there is none.
-using DescriptorLookup = std::function<const IntensityScanContext*(FrameId)>;
+/// The descriptor of a frame, if there is one.
+using DescriptorLookup = std::function<std::optional<DescriptorView>(FrameId)>;
 
 /// Averages the N preceding pairs of frame numbers, in both directions of travel. Frames that a recording leaves out
 /// make no pair; without any pair there is nothing to refuse by, and geometry decides alone.

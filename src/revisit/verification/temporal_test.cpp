@@ -25,9 +25,10 @@ class TemporalConsistency : public testing::Test {
     }
   }
   TemporalEvidence check(int query, int match, double min_score = 1.8) const {
-    const DescriptorLookup lookup = [this](FrameId frame) {
+    const DescriptorLookup lookup = [this](FrameId frame) -> std::optional<DescriptorView> {
       const auto found = descriptors_.find(frame);
-      return found == descriptors_.end() ? nullptr : &found->second;
+      if (found == descriptors_.end()) return std::nullopt;
+      return found->second;
     };
     TemporalOptions options;
     options.min_score = min_score;

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+// Bounds, order and threads never change an answer: the search against comparing every place with the readable
+// reference.
+#include <revisit/retrieval/internal/nearest_images.hpp>
+
+#include <algorithm>
+#include <random>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+namespace revisit::retrieval_internal {
+namespace {
+
+struct Grid {
+  int rings, sectors;
+};
+
+class Places {
+ public:
+  Places(const Grid& grid, unsigned seed) : grid_(grid), random_(seed) {}
+
+  IntensityScanContext even(double density) {
+    IntensityScanContext context = empty();
+    for (std::size_t i = 0; i < context.cells(); ++i)
+      if (uniform() < density) set(context, i);
+    return context;
+  }
+  // Denser near the sensor and in some sectors, as scans are.
+  IntensityScanContext as_scans_are() {
+    IntensityScanContext context = empty();
+    for (int sector = 0; sector < grid_.sectors; ++sector) {
+      const double reach = uniform() * grid_.rings;
+      for (int ring = 0; ring < grid_.rings; ++ring)
+        if (uniform() < (ring < reach ? 0.95 : 0.08)) set(context, cell(sector, ring));
+    }
+    return context;
+  }
+  // The same place again: turned, and some cells changed.
+  IntensityScanContext again(const IntensityScanContext& place, double changed) {
+    IntensityScanContext context = empty();
+    const int shift = static_cast<int>(uniform() * grid_.sectors);
+    for (int sector = 0; sector < grid_.sectors; ++sector)
+      for (int ring = 0; ring < grid_.rings; ++ring)
+        if (place.occupied(ring, sector) != (uniform() < changed))
+          set(context, cell((sector + shift) % grid_.sectors, ring));
+    return context;
+  }
+
+ private:
+  double uniform() { return std::uniform_real_distribution<double>()(random_); }
+  std::size_t cell(int sector, int ring) const { return static_cast<std::size_t>(sector * grid_.rings + ring); }
+  IntensityScanContext empty() const {
+    IntensityScanContext context;
+    context.rings = grid_.rings;
+    context.sectors = grid_.sectors;
+    context.intensity.resize(cell(grid_.sectors, 0));
+    context.occupancy.resize(revisit_bits_words(static_cast<std::uint32_t>(context.cells())));
+    return context;
+  }
+  static void set(IntensityScanContext& context, std::size_t i) {
+    context.intensity[i] = 100;
+    context.occupancy[i / 64] |= std::uint64_t{1} << (i % 64);
+  }
+
+  Grid grid_;
+  std::mt19937 random_;
+};
+
+// The distance to every place, by the readable reference.
+std::vector<NearImage> compare_all(const PlaceStore& store, const IntensityScanContext& query) {
+  std::vector<NearImage> all(store.size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    all[i].place = i;
+    all[i].distance =
+        revisit_bits_min_hamming(query.occupancy.data(), store.image(i), static_cast<std::uint32_t>(query.rings),
+                                 static_cast<std::uint32_t>(query.sectors), &all[i].shift);
+  }
+  return all;
+}
+
+std::vector<NearImage> nearest_of(std::vector<NearImage> all, std::size_t among, std::size_t count,
+                                  std::uint32_t farthest) {
+  all.resize(among);
+  std::erase_if(all, [&](const NearImage& each) { return each.distance > farthest; });
+  std::sort(all.begin(), all.end());
+  all.resize(std::min(all.size(), count));
+  return all;
+}
+
+void expect_same(const std::vector<NearImage>& found, const std::vector<NearImage>& expected) {
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    ASSERT_EQ(found[i].place, expected[i].place) << "rank " << i;
+    ASSERT_EQ(found[i].distance, expected[i].distance);
+    ASSERT_EQ(found[i].shift, expected[i].shift);
+  }
+}
+
+class NearestImages : public testing::TestWithParam<Grid> {};
+
+TEST_P(NearestImages, AreThoseOfComparingAll) {
+  for (const int kind : {0, 1, 2}) {
+    SCOPED_TRACE(kind);
+    Places places(GetParam(), 5 + static_cast<unsigned>(kind));
+    PlaceStore store;
+    std::vector<IntensityScanContext> seen;
+    for (int i = 0; i < 400; ++i) {
+      // Random ones, clustered ones, and many that are alike to the bit.
+      const bool again = kind > 0 && i % 4 != 0;
+      seen.push_back(again       ? places.again(seen[static_cast<std::size_t>(i / 4 * 4)], kind == 2 ? 0.0 : 0.05)
+                     : kind == 0 ? places.even(0.002 * i)
+                                 : places.as_scans_are());
+      store.add(FrameId{i}, 0.1 * i, seen.back());
+    }
+    std::size_t compared = 0, searched = 0;
+    for (const std::size_t q : {0u, 101u, 399u}) {
+      const IntensityScanContext query = places.again(seen[q], 0.03);
+      const std::vector<NearImage> all = compare_all(store, query);
+      for (const std::size_t count : {1u, 10u, 25u, 200u, 5000u})
+        for (const std::size_t among : {1u, 64u, 249u, 400u})
+          for (const std::uint32_t farthest : {UINT32_MAX, 60u, 0u})
+            for (const int threads : {1, 3}) {
+              SearchCounts counts;
+              expect_same(nearest_images(store, among, query.occupancy.data(), count, farthest, threads, &counts),
+                          nearest_of(all, among, count, farthest));
+              EXPECT_EQ(counts.places, among);
+              if (count == 1 && among == 400) {
+                compared += counts.compared;
+                searched += among;
+              }
+            }
+    }
+    if (kind == 1 && GetParam().rings > 10) {
+      EXPECT_LT(compared, searched * 9 / 10) << "bounds exclude some";
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Grids, NearestImages, testing::Values(Grid{60, 20}, Grid{20, 60}, Grid{3, 5}, Grid{64, 64}),
+                         [](const auto& grid) {
+                           return std::to_string(grid.param.rings) + "x" + std::to_string(grid.param.sectors);
+                         });
+
+TEST(PlaceStore, IsSearchedWhileItGrows) {
+  Places places({60, 20}, 9);
+  std::vector<IntensityScanContext> seen;
+  for (int i = 0; i < 6000; ++i)
+    seen.push_back(i < 40 ? places.as_scans_are() : seen[static_cast<std::size_t>(i % 40)]);
+  PlaceStore store;
+  store.add(FrameId{0}, 0.0, seen[0]);
+  std::thread writer([&] {
+    for (int i = 1; i < 6000; ++i) store.add(FrameId{i}, 0.1 * i, seen[static_cast<std::size_t>(i)]);
+  });
+  std::size_t size = 0;
+  while (size < 6000) {
+    size = store.size();
+    const auto found = nearest_images(store, size, seen[0].occupancy.data(), 3, UINT32_MAX);
+    ASSERT_EQ(found[0].place, 0u);
+    ASSERT_EQ(found[0].distance, 0u);
+    if (found.size() > 1 && size > 40) {
+      ASSERT_EQ(found[1].place, 40u);
+    }
+  }
+  writer.join();
+}
+
+TEST(PlaceStore, StampsThatRunBackwardsDoNotMakeAPlaceOlder) {
+  Places places({60, 20}, 9);
+  PlaceStore store;
+  for (const double stamp_s : {1.0, 5.0, 2.0, 6.0})
+    store.add(FrameId{static_cast<std::int64_t>(store.size())}, stamp_s, places.even(0.3));
+  EXPECT_EQ(store.latest_s(2), 5.0);
+  EXPECT_EQ(store.latest_s(3), 6.0);
+}
+
+}  // namespace
+}  // namespace revisit::retrieval_internal
