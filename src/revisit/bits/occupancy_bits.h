@@ -37,8 +37,8 @@ uint32_t revisit_bits_min_hamming_turned(const uint64_t* turned, const uint64_t*
 #define REVISIT_BITS_BLOCK 64
 void revisit_bits_count(const uint64_t* image, uint32_t rings, uint32_t sectors, uint8_t counts[REVISIT_BITS_GROUPS]);
 
-/* Lower bounds, at most 255, of the distances of a query to the places of `blocks` blocks. `counts` holds for each block
- * [group][place of 64], `bounds` one byte a place. */
+/* Lower bounds, at most 255, of the distances of a query to the places of `blocks` blocks. `counts` holds for each
+ * block [group][place of 64], `bounds` one byte a place. */
 void revisit_bits_bounds(const uint8_t query[REVISIT_BITS_GROUPS], const uint8_t* counts, size_t blocks,
                          uint8_t* bounds);
 
