@@ -37,6 +37,8 @@ endfunction()
 add_library(revisit_flags INTERFACE)
 target_compile_options(revisit_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
   -Wno-restrict)  # GCC 12 warns of its own std::string
+# Highway's target for processors that count bits in whole vectors (VPOPCNTDQ), the same for every file that chooses.
+target_compile_definitions(revisit_flags INTERFACE HWY_WANT_AVX3_DL)
 if(REVISIT_SANITIZE)
   add_compile_options(-fsanitize=${REVISIT_SANITIZE} -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${REVISIT_SANITIZE})

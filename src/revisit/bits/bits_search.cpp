@@ -2,22 +2,15 @@
 // Compiled once for each instruction set by Highway's foreach_target; the best one is chosen at run time.
 #include <revisit/bits/occupancy_bits.h>
 
-// Processors that count bits in whole vectors (VPOPCNTDQ) are worth a target of their own here.
-#define HWY_WANT_AVX3_DL
-
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "revisit/bits/bits_search.cpp"
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
-#include <revisit/bits/internal/targets.hpp>
-
 HWY_BEFORE_NAMESPACE();
 namespace revisit::bits_internal {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
-
-size_t RunningLanes() { return hn::Lanes(hn::ScalableTag<uint64_t>()); }
 
 struct Best {
   uint32_t distance, shift;
@@ -114,29 +107,8 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace revisit::bits_internal {
 
-HWY_EXPORT(RunningLanes);
 HWY_EXPORT(MinHamming);
 HWY_EXPORT(Bounds);
-
-std::vector<std::int64_t> supported_targets() {
-  std::vector<std::int64_t> targets;
-  const std::int64_t compiled = hwy::SupportedTargets() & HWY_TARGETS;
-  for (int bit = 0; bit < 63; ++bit)
-    if (compiled >> bit & 1) targets.push_back(std::int64_t{1} << bit);
-  return targets;
-}
-
-void force_target(std::int64_t target) {
-  hwy::SetSupportedTargetsForTest(target);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-}
-
-const char* current_target_name() {
-  const std::int64_t runnable = hwy::SupportedTargets() & HWY_TARGETS;
-  return hwy::TargetName(runnable & -runnable);  // the lowest bit is the best target
-}
-
-std::size_t running_lanes() { return HWY_DYNAMIC_DISPATCH(RunningLanes)(); }
 
 }  // namespace revisit::bits_internal
 

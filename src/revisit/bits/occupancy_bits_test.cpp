@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-#include <revisit/bits/internal/targets.hpp>
+#include <revisit/bits/instruction_sets.hpp>
 
 namespace {
 
@@ -82,19 +82,19 @@ std::vector<uint64_t> turned(const Image& query) {
   return words;
 }
 
-using revisit::bits_internal::force_target;
-using revisit::bits_internal::supported_targets;
+using revisit::force_instruction_set;
+using revisit::supported_instruction_sets;
 
 class EveryInstructionSet : public testing::Test {
  protected:
-  ~EveryInstructionSet() override { force_target(0); }
+  ~EveryInstructionSet() override { force_instruction_set(0); }
 };
 
 TEST_F(EveryInstructionSet, FindsTheDistanceAndShiftOfTheReference) {
   std::mt19937 generator(3);
-  for (const int64_t target : supported_targets()) {
-    force_target(target);
-    SCOPED_TRACE(revisit::bits_internal::current_target_name());
+  for (const int64_t target : supported_instruction_sets()) {
+    force_instruction_set(target);
+    SCOPED_TRACE(revisit::instruction_set_name());
     for (const auto& [rings, sectors] : {std::pair{60u, 20u},
                                          {20u, 60u},
                                          {1u, 1u},
@@ -129,8 +129,8 @@ TEST_F(EveryInstructionSet, FindsTheDistanceAndShiftOfTheReference) {
 
 TEST_F(EveryInstructionSet, BoundsAreTheSumsOfDifferencesAndNeverAboveTheDistance) {
   std::mt19937 generator(4);
-  for (const int64_t target : supported_targets()) {
-    force_target(target);
+  for (const int64_t target : supported_instruction_sets()) {
+    force_instruction_set(target);
     for (const auto& [rings, sectors] : {std::pair{60u, 20u}, {20u, 60u}, {3u, 5u}, {64u, 64u}}) {
       constexpr size_t kPlaces = 2 * REVISIT_BITS_BLOCK;
       const Image query = random_image(rings, sectors, 0.5, generator);
@@ -160,11 +160,11 @@ TEST_F(EveryInstructionSet, BoundsAreTheSumsOfDifferencesAndNeverAboveTheDistanc
 TEST_F(EveryInstructionSet, ForcingOneChangesWhatRuns) {
   std::set<size_t> lanes;
   std::set<std::string> names;
-  const auto targets = supported_targets();
+  const auto targets = supported_instruction_sets();
   for (const int64_t target : targets) {
-    force_target(target);
-    lanes.insert(revisit::bits_internal::running_lanes());
-    names.insert(revisit::bits_internal::current_target_name());
+    force_instruction_set(target);
+    lanes.insert(revisit::instruction_set_lanes());
+    names.insert(revisit::instruction_set_name());
   }
   EXPECT_EQ(names.size(), targets.size());
   if (targets.size() > 3) {

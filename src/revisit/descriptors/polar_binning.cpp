@@ -106,23 +106,5 @@ void bin_points(const Point* points, std::size_t count, const PolarGrid& grid, s
   HWY_DYNAMIC_DISPATCH(BinPoints)(points, count, grid, cells);
 }
 
-std::vector<std::int64_t> supported_targets() {
-  std::vector<std::int64_t> targets;
-  const std::int64_t compiled = hwy::SupportedTargets() & HWY_TARGETS;
-  for (int bit = 0; bit < 63; ++bit)
-    if (compiled >> bit & 1) targets.push_back(std::int64_t{1} << bit);
-  return targets;
-}
-
-void force_target(std::int64_t target) {
-  hwy::SetSupportedTargetsForTest(target);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-}
-
-const char* current_target_name() {
-  const std::int64_t runnable = hwy::SupportedTargets() & HWY_TARGETS;
-  return hwy::TargetName(runnable & -runnable);  // the lowest bit is the best target
-}
-
 }  // namespace revisit::descriptors_internal
 #endif  // HWY_ONCE

@@ -9,6 +9,8 @@
 
 #include <gtest/gtest.h>
 
+#include <revisit/bits/instruction_sets.hpp>
+
 namespace revisit::descriptors_internal {
 namespace {
 
@@ -40,15 +42,15 @@ std::vector<Point> hard_points(const PolarGrid& grid, std::size_t count, unsigne
 
 class EveryTarget : public testing::Test {
  protected:
-  ~EveryTarget() override { force_target(0); }
+  ~EveryTarget() override { force_instruction_set(0); }
 };
 
 TEST_F(EveryTarget, EqualsTheScalarReferenceBitForBit) {
   std::set<std::string> names;
-  const auto targets = supported_targets();
+  const auto targets = supported_instruction_sets();
   for (const std::int64_t target : targets) {
-    force_target(target);
-    names.insert(current_target_name());
+    force_instruction_set(target);
+    names.insert(instruction_set_name());
     for (const PolarGrid& grid :
          {PolarGrid{60, 20, 50.0}, {20, 60, 50.0}, {1, 1, 10.0}, {512, 720, 80.0}, {7, 13, 33.3}}) {
       for (const std::size_t count : {0u, 1u, 15u, 20000u}) {
@@ -57,7 +59,7 @@ TEST_F(EveryTarget, EqualsTheScalarReferenceBitForBit) {
         bin_points(points.data(), points.size(), grid, fast.data());
         bin_points_scalar(points.data(), points.size(), grid, slow.data());
         fast.back() = slow.back() = 0;  // beyond the range
-        EXPECT_EQ(fast, slow) << current_target_name() << ", " << grid.rings << " x " << grid.sectors;
+        EXPECT_EQ(fast, slow) << instruction_set_name() << ", " << grid.rings << " x " << grid.sectors;
       }
     }
   }

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include <revisit/core/scan.hpp>
 
@@ -26,13 +25,5 @@ void bin_points(const Point* points, std::size_t count, const PolarGrid& grid, s
 
 /// The readable reference of bin_points.
 void bin_points_scalar(const Point* points, std::size_t count, const PolarGrid& grid, std::uint16_t* cells);
-
-/// The instruction sets that this processor can run, as Highway's target bits, for tests that force each; while one is
-/// forced, that one alone.
-std::vector<std::int64_t> supported_targets();
-/// Forces one target for bin_points; 0 returns to the best. Not for use while other threads describe.
-void force_target(std::int64_t target);
-/// Highway's name of the target that bin_points runs on.
-const char* current_target_name();
 
 }  // namespace revisit::descriptors_internal

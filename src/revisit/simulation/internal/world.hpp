@@ -61,6 +61,9 @@ struct StreetDrive {
 };
 StreetDrive drive_through_streets(double length_m, std::uint64_t seed);
 
+/// Who moves through the town while the sensor drives: none through walls, none in the sensor's way.
+void plan_traffic(World& world, double traffic);
+
 /// Fills the town along its roads.
 void populate_town(World& world, double traffic);
 
