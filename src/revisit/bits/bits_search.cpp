@@ -80,22 +80,29 @@ uint32_t MinHamming(const uint64_t* turned, const uint64_t* candidate, uint32_t 
   return best.distance;
 }
 
-// One vector of places at a time, one byte each.
-void Bounds(const uint8_t* HWY_RESTRICT query, const uint8_t* HWY_RESTRICT counts, size_t blocks,
+// Lanes are places, one byte each: a vector of places is laid on all turns of the query.
+void Bounds(const uint8_t* HWY_RESTRICT turned, uint32_t sectors, const uint8_t* HWY_RESTRICT counts, size_t blocks,
             uint8_t* HWY_RESTRICT bounds) {
   const hn::CappedTag<uint8_t, REVISIT_BITS_BLOCK> d;
   const size_t width = hn::Lanes(d);
+  const size_t columns = HWY_MIN(sectors, uint32_t{REVISIT_BITS_COLUMNS});
   for (size_t block = 0; block < blocks; ++block) {
     for (size_t place = 0; place < REVISIT_BITS_BLOCK; place += width) {
-      auto sum = hn::Zero(d);
-      for (size_t group = 0; group < REVISIT_BITS_GROUPS; ++group) {
-        const auto q = hn::Set(d, query[group]);
-        const auto c = hn::LoadU(d, counts + group * REVISIT_BITS_BLOCK + place);
-        sum = hn::SaturatedAdd(sum, hn::Sub(hn::Max(q, c), hn::Min(q, c)));
+      auto least = hn::Set(d, uint8_t{255});
+      const uint8_t* HWY_RESTRICT query = turned;
+      for (uint32_t turn = 0; turn < sectors; ++turn) {
+        auto sum = hn::Zero(d);
+        for (size_t column = 0; column < columns; ++column) {
+          const auto q = hn::LoadU(d, query + column * REVISIT_BITS_BLOCK);
+          const auto c = hn::LoadU(d, counts + column * REVISIT_BITS_BLOCK + place);
+          sum = hn::SaturatedAdd(sum, hn::Sub(hn::Max(q, c), hn::Min(q, c)));
+        }
+        least = hn::Min(least, sum);
+        query += size_t{REVISIT_BITS_COLUMNS} * REVISIT_BITS_BLOCK;
       }
-      hn::StoreU(sum, d, bounds + place);
+      hn::StoreU(least, d, bounds + place);
     }
-    counts += size_t{REVISIT_BITS_GROUPS} * REVISIT_BITS_BLOCK;
+    counts += size_t{REVISIT_BITS_COLUMNS} * REVISIT_BITS_BLOCK;
     bounds += REVISIT_BITS_BLOCK;
   }
 }
@@ -119,8 +126,8 @@ uint32_t revisit_bits_min_hamming_turned(const uint64_t* turned, const uint64_t*
   return HWY_DYNAMIC_DISPATCH(MinHamming)(turned, candidate, rings, sectors, limit, best_shift);
 }
 
-void revisit_bits_bounds(const uint8_t query[REVISIT_BITS_GROUPS], const uint8_t* counts, size_t blocks,
+void revisit_bits_bounds(const uint8_t* turned, uint32_t sectors, const uint8_t* counts, size_t blocks,
                          uint8_t* bounds) {
-  HWY_DYNAMIC_DISPATCH(Bounds)(query, counts, blocks, bounds);
+  HWY_DYNAMIC_DISPATCH(Bounds)(turned, sectors, counts, blocks, bounds);
 }
 #endif  // HWY_ONCE

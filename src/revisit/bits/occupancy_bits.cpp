@@ -3,6 +3,7 @@
 #include <revisit/bits/occupancy_bits.h>
 
 #include <bit>
+#include <cstring>
 
 namespace {
 
@@ -66,13 +67,50 @@ void revisit_bits_turn(const uint64_t* query, uint32_t rings, uint32_t sectors, 
       turned[size_t{w} * lanes + lane] = turned_word(query, rings, sectors, lane < sectors ? lane : 0, w);
 }
 
-void revisit_bits_count(const uint64_t* image, uint32_t rings, uint32_t sectors, uint8_t counts[REVISIT_BITS_GROUPS]) {
-  uint32_t sums[REVISIT_BITS_GROUPS] = {};
-  for (uint32_t sector = 0; sector < sectors; ++sector)
-    for (uint32_t ring = 0; ring < rings; ++ring) {
-      const uint32_t bit = sector * rings + ring;
-      sums[size_t{ring} * REVISIT_BITS_GROUPS / rings] += static_cast<uint32_t>(image[bit / 64] >> (bit % 64) & 1);
+namespace {
+
+// The bits set in [begin, end).
+uint32_t count_bits(const uint64_t* words, uint32_t begin, uint32_t end) {
+  uint32_t sum = 0;
+  while (begin < end) {
+    const uint32_t offset = begin % 64, length = end - begin < 64 - offset ? end - begin : 64 - offset;
+    const uint64_t mask = length == 64 ? ~uint64_t{0} : (uint64_t{1} << length) - 1;
+    sum += static_cast<uint32_t>(std::popcount(words[begin / 64] >> offset & mask));
+    begin += length;
+  }
+  return sum;
+}
+
+// The occupied cells of each column, sector j of the image laid on sector j + shift.
+void count_columns(const uint64_t* image, uint32_t rings, uint32_t sectors, uint32_t shift,
+                   uint8_t counts[REVISIT_BITS_COLUMNS]) {
+  const uint32_t columns = sectors < REVISIT_BITS_COLUMNS ? sectors : REVISIT_BITS_COLUMNS;
+  uint32_t sums[REVISIT_BITS_COLUMNS] = {};
+  for (uint32_t j = 0; j < sectors; ++j) {
+    const uint32_t column = static_cast<uint32_t>(uint64_t{(j + shift) % sectors} * columns / sectors);
+    sums[column] += count_bits(image, j * rings, (j + 1) * rings);
+  }
+  for (int c = 0; c < REVISIT_BITS_COLUMNS; ++c) counts[c] = static_cast<uint8_t>(sums[c] < 255 ? sums[c] : 255);
+}
+
+}  // namespace
+
+void revisit_bits_columns(const uint64_t* image, uint32_t rings, uint32_t sectors,
+                          uint8_t counts[REVISIT_BITS_COLUMNS]) {
+  count_columns(image, rings, sectors, 0, counts);
+}
+
+size_t revisit_bits_turned_columns_bytes(uint32_t sectors) {
+  return size_t{sectors} * REVISIT_BITS_COLUMNS * REVISIT_BITS_BLOCK;
+}
+
+void revisit_bits_turn_columns(const uint64_t* query, uint32_t rings, uint32_t sectors, uint8_t* turned) {
+  for (uint32_t shift = 0; shift < sectors; ++shift) {
+    uint8_t counts[REVISIT_BITS_COLUMNS];
+    count_columns(query, rings, sectors, shift, counts);
+    for (const uint8_t count : counts) {
+      std::memset(turned, count, REVISIT_BITS_BLOCK);
+      turned += REVISIT_BITS_BLOCK;
     }
-  for (int group = 0; group < REVISIT_BITS_GROUPS; ++group)
-    counts[group] = static_cast<uint8_t>(sums[group] < 255 ? sums[group] : 255);
+  }
 }

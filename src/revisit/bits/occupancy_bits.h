@@ -31,15 +31,22 @@ void revisit_bits_turn(const uint64_t* query, uint32_t rings, uint32_t sectors, 
 uint32_t revisit_bits_min_hamming_turned(const uint64_t* turned, const uint64_t* candidate, uint32_t rings,
                                          uint32_t sectors, uint32_t limit, uint32_t* best_shift);
 
-/* How many cells are occupied in each of 8 groups of neighbouring rings, at most 255 counted. No turn changes them, so
- * the sum of their differences is a lower bound of the distance (docs/retrieval.md). */
-#define REVISIT_BITS_GROUPS 8
+/* How many cells are occupied in each of 20 columns, which are neighbouring sectors taken together (fewer sectors,
+ * fewer columns; the rest is 0), at most 255 counted. The differences of these counts between a turned query and a
+ * place sum to no more than the cells that differ: the smallest sum over all turns is a lower bound of the distance
+ * (docs/retrieval.md). */
+#define REVISIT_BITS_COLUMNS 20
 #define REVISIT_BITS_BLOCK 64
-void revisit_bits_count(const uint64_t* image, uint32_t rings, uint32_t sectors, uint8_t counts[REVISIT_BITS_GROUPS]);
+void revisit_bits_columns(const uint64_t* image, uint32_t rings, uint32_t sectors,
+                          uint8_t counts[REVISIT_BITS_COLUMNS]);
+
+/* The columns of all turns of a query, each count repeated for every place of a block: [turn][column][64]. */
+size_t revisit_bits_turned_columns_bytes(uint32_t sectors);
+void revisit_bits_turn_columns(const uint64_t* query, uint32_t rings, uint32_t sectors, uint8_t* turned);
 
 /* Lower bounds, at most 255, of the distances of a query to the places of `blocks` blocks. `counts` holds for each
- * block [group][place of 64], `bounds` one byte a place. */
-void revisit_bits_bounds(const uint8_t query[REVISIT_BITS_GROUPS], const uint8_t* counts, size_t blocks,
+ * block [column][place of 64], `bounds` one byte a place. */
+void revisit_bits_bounds(const uint8_t* turned, uint32_t sectors, const uint8_t* counts, size_t blocks,
                          uint8_t* bounds);
 
 #ifdef __cplusplus

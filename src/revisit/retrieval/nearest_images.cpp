@@ -19,7 +19,7 @@ constexpr std::size_t kBlock = REVISIT_BITS_BLOCK;
 struct Query {
   const PlaceStore& store;
   const std::vector<std::uint64_t>& turned;
-  std::array<std::uint8_t, REVISIT_BITS_GROUPS> counts;
+  const std::vector<std::uint8_t>& turned_columns;
   std::size_t wanted;
   std::atomic<std::uint32_t> limit;
 };
@@ -76,7 +76,7 @@ std::size_t search_part(Query& query, std::size_t begin, std::size_t end, std::v
   bounds.resize(std::max(bounds.size(), (end - begin + kBlock - 1) / kBlock * kBlock));
   for (std::size_t at = begin; at < end;) {
     const std::size_t stop = std::min(end, (at / PlaceStore::kChunk + 1) * PlaceStore::kChunk);
-    query.store.bounds(query.counts.data(), at, stop, bounds.data() + (at - begin));
+    query.store.bounds(query.turned_columns.data(), at, stop, bounds.data() + (at - begin));
     at = stop;
   }
   std::array<std::uint32_t, 256> histogram{};
@@ -113,8 +113,11 @@ std::vector<NearImage> nearest_images(const PlaceStore& store, std::size_t place
   thread_local std::vector<std::uint64_t> turned;
   turned.resize(revisit_bits_turned_words(rings, sectors));
   revisit_bits_turn(query, rings, sectors, turned.data());
-  Query shared{store, turned, {}, std::min(count, places), farthest == UINT32_MAX ? farthest : farthest + 1};
-  revisit_bits_count(query, rings, sectors, shared.counts.data());
+  thread_local std::vector<std::uint8_t> turned_columns;
+  turned_columns.resize(revisit_bits_turned_columns_bytes(sectors));
+  revisit_bits_turn_columns(query, rings, sectors, turned_columns.data());
+  Query shared{store, turned, turned_columns, std::min(count, places),
+               farthest == UINT32_MAX ? farthest : farthest + 1};
 
   const auto parts = static_cast<std::size_t>(std::max(1, threads));
   const std::size_t part_size = ((places + parts - 1) / parts + kBlock - 1) / kBlock * kBlock;

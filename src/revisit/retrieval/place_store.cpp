@@ -32,7 +32,7 @@ void PlaceStore::add(FrameId frame, double stamp_s, const IntensityScanContext& 
   }
   if (i % kChunk == 0) {
     auto fresh = std::make_unique<Chunk>();
-    fresh->counts.resize(kChunk * REVISIT_BITS_GROUPS);
+    fresh->counts.resize(kChunk * REVISIT_BITS_COLUMNS);
     fresh->images.resize(kChunk * words_);
     fresh->intensity.resize(kChunk * cells_);
     fresh->frames.resize(kChunk);
@@ -41,12 +41,12 @@ void PlaceStore::add(FrameId frame, double stamp_s, const IntensityScanContext& 
   }
   Chunk& chunk = *chunks_[i / kChunk].load(std::memory_order_relaxed);
   const std::size_t at = i % kChunk;
-  std::uint8_t counts[REVISIT_BITS_GROUPS];
-  revisit_bits_count(descriptor.occupancy.data(), static_cast<std::uint32_t>(rings_),
-                     static_cast<std::uint32_t>(sectors_), counts);
-  for (std::size_t group = 0; group < REVISIT_BITS_GROUPS; ++group)
-    chunk.counts[(at / REVISIT_BITS_BLOCK * REVISIT_BITS_GROUPS + group) * REVISIT_BITS_BLOCK +
-                 at % REVISIT_BITS_BLOCK] = counts[group];
+  std::uint8_t counts[REVISIT_BITS_COLUMNS];
+  revisit_bits_columns(descriptor.occupancy.data(), static_cast<std::uint32_t>(rings_),
+                       static_cast<std::uint32_t>(sectors_), counts);
+  for (std::size_t column = 0; column < REVISIT_BITS_COLUMNS; ++column)
+    chunk.counts[(at / REVISIT_BITS_BLOCK * REVISIT_BITS_COLUMNS + column) * REVISIT_BITS_BLOCK +
+                 at % REVISIT_BITS_BLOCK] = counts[column];
   std::copy(descriptor.occupancy.begin(), descriptor.occupancy.end(),
             chunk.images.begin() + static_cast<std::ptrdiff_t>(at * words_));
   std::copy(descriptor.intensity.begin(), descriptor.intensity.end(),
@@ -56,18 +56,19 @@ void PlaceStore::add(FrameId frame, double stamp_s, const IntensityScanContext& 
   size_.store(i + 1, std::memory_order_release);
 }
 
-void PlaceStore::bounds(const std::uint8_t query[REVISIT_BITS_GROUPS], std::size_t begin, std::size_t end,
+void PlaceStore::bounds(const std::uint8_t* turned_columns, std::size_t begin, std::size_t end,
                         std::uint8_t* bounds) const {
-  const std::uint8_t* counts = chunk(begin).counts.data() + begin % kChunk * REVISIT_BITS_GROUPS;
+  const std::uint8_t* counts = chunk(begin).counts.data() + begin % kChunk * REVISIT_BITS_COLUMNS;
   const std::size_t whole = (end - begin) / REVISIT_BITS_BLOCK, rest = (end - begin) % REVISIT_BITS_BLOCK;
-  revisit_bits_bounds(query, counts, whole, bounds);
+  revisit_bits_bounds(turned_columns, static_cast<std::uint32_t>(sectors_), counts, whole, bounds);
   if (rest == 0) return;
   // The last block may be written to at this moment, beyond the places that are asked for: those alone are read.
-  counts += whole * REVISIT_BITS_GROUPS * REVISIT_BITS_BLOCK;
-  std::uint8_t block[REVISIT_BITS_GROUPS * REVISIT_BITS_BLOCK] = {};
-  for (std::size_t group = 0; group < REVISIT_BITS_GROUPS; ++group)
-    std::memcpy(block + group * REVISIT_BITS_BLOCK, counts + group * REVISIT_BITS_BLOCK, rest);
-  revisit_bits_bounds(query, block, 1, bounds + whole * REVISIT_BITS_BLOCK);
+  counts += whole * REVISIT_BITS_COLUMNS * REVISIT_BITS_BLOCK;
+  std::uint8_t block[REVISIT_BITS_COLUMNS * REVISIT_BITS_BLOCK] = {};
+  for (std::size_t column = 0; column < REVISIT_BITS_COLUMNS; ++column)
+    std::memcpy(block + column * REVISIT_BITS_BLOCK, counts + column * REVISIT_BITS_BLOCK, rest);
+  revisit_bits_bounds(turned_columns, static_cast<std::uint32_t>(sectors_), block, 1,
+                      bounds + whole * REVISIT_BITS_BLOCK);
 }
 
 }  // namespace revisit::retrieval_internal

@@ -41,14 +41,13 @@ class PlaceStore {
     return {rings_, sectors_, chunk(i).intensity.data() + i % kChunk * cells_, image(i)};
   }
 
-  /// Lower bounds of the distances to the places [begin, end), which lie in one chunk; `begin` is a multiple of 64.
-  /// `bounds` has room for end - begin, filled up to a multiple of 64.
-  void bounds(const std::uint8_t query[REVISIT_BITS_GROUPS], std::size_t begin, std::size_t end,
-              std::uint8_t* bounds) const;
+  /// Lower bounds of the distances of a query, given by the columns of its turns, to the places [begin, end), which lie
+  /// in one chunk; `begin` is a multiple of 64. `bounds` has room for end - begin, filled up to a multiple of 64.
+  void bounds(const std::uint8_t* turned_columns, std::size_t begin, std::size_t end, std::uint8_t* bounds) const;
 
  private:
   struct Chunk {
-    std::vector<std::uint8_t> counts;     ///< [block of 64][group][place]
+    std::vector<std::uint8_t> counts;     ///< [block of 64][column][place]
     std::vector<std::uint64_t> images;    ///< [place][word]
     std::vector<std::uint8_t> intensity;  ///< [place][cell]
     std::vector<std::int64_t> frames;
