@@ -85,14 +85,13 @@ void Bounds(const uint8_t* HWY_RESTRICT turned, uint32_t sectors, const uint8_t*
             uint8_t* HWY_RESTRICT bounds) {
   const hn::CappedTag<uint8_t, REVISIT_BITS_BLOCK> d;
   const size_t width = hn::Lanes(d);
-  const size_t columns = HWY_MIN(sectors, uint32_t{REVISIT_BITS_COLUMNS});
   for (size_t block = 0; block < blocks; ++block) {
     for (size_t place = 0; place < REVISIT_BITS_BLOCK; place += width) {
       auto least = hn::Set(d, uint8_t{255});
       const uint8_t* HWY_RESTRICT query = turned;
       for (uint32_t turn = 0; turn < sectors; ++turn) {
         auto sum = hn::Zero(d);
-        for (size_t column = 0; column < columns; ++column) {
+        for (size_t column = 0; column < REVISIT_BITS_COLUMNS; ++column) {  // unrolled: the place stays in registers
           const auto q = hn::LoadU(d, query + column * REVISIT_BITS_BLOCK);
           const auto c = hn::LoadU(d, counts + column * REVISIT_BITS_BLOCK + place);
           sum = hn::SaturatedAdd(sum, hn::Sub(hn::Max(q, c), hn::Min(q, c)));

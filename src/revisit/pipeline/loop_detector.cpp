@@ -165,7 +165,7 @@ void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
 }
 
 void LoopDetector::remember(PreparedScan prepared, const std::optional<Pose>& T_world_lidar) {
-  index_.add(prepared.scan.frame, prepared.scan.stamp_s, std::move(prepared.descriptor));
+  index_.add(prepared.scan.frame, prepared.scan.stamp_s, prepared.descriptor);
   places_[prepared.scan.frame] = {std::move(prepared.cloud), T_world_lidar};
 }
 
