@@ -102,7 +102,7 @@ void packed_pair(benchmark::State& state, int rings) {
   Grid& all = grid(rings);
   const PlaceStore& store = all.with(kPlaces);
   const auto r = static_cast<std::uint32_t>(store.rings()), s = static_cast<std::uint32_t>(store.sectors());
-  std::vector<std::uint64_t> turned(revisit_bits_turned_words(r, s));
+  AlignedVector<std::uint64_t> turned(revisit_bits_turned_words(r, s));
   revisit_bits_turn(all.places.query(3).occupancy.data(), r, s, turned.data());
   std::size_t next = 0;
   for (auto _ : state) {

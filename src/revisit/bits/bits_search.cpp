@@ -42,14 +42,24 @@ HWY_INLINE void LayOnTurns(const uint64_t* HWY_RESTRICT turned, const uint64_t* 
     if constexpr (kVectors > 3) least = hn::Min(least, e);
     if (hn::AllFalse(d, hn::Lt(least, limit))) return;
   }
-  HWY_ALIGN uint64_t distances[4 * 8];
-  hn::Store(a, d, distances);
-  if constexpr (kVectors > 1) hn::Store(b, d, distances + width);
-  if constexpr (kVectors > 2) hn::Store(c, d, distances + 2 * width);
-  if constexpr (kVectors > 3) hn::Store(e, d, distances + 3 * width);
-  for (size_t lane = 0; lane < kVectors * width; ++lane)
-    if (distances[lane] < best.distance)
-      best = {static_cast<uint32_t>(distances[lane]), static_cast<uint32_t>(first + lane)};
+  auto least = a;
+  if constexpr (kVectors > 1) least = hn::Min(least, b);
+  if constexpr (kVectors > 2) least = hn::Min(least, c);
+  if constexpr (kVectors > 3) least = hn::Min(least, e);
+  const uint64_t distance = hn::GetLane(hn::MinOfLanes(d, least));
+  if (distance >= best.distance) return;
+  // The first turn that reaches it.
+  const auto wanted = hn::Set(d, distance);
+  intptr_t lane = hn::FindFirstTrue(d, hn::Eq(a, wanted));
+  const auto look_on = [&](decltype(a) sums, size_t vector) HWY_ATTR {
+    if (lane >= 0) return;
+    lane = hn::FindFirstTrue(d, hn::Eq(sums, wanted));
+    if (lane >= 0) lane += static_cast<intptr_t>(vector * width);
+  };
+  if constexpr (kVectors > 1) look_on(b, 1);
+  if constexpr (kVectors > 2) look_on(c, 2);
+  if constexpr (kVectors > 3) look_on(e, 3);
+  best = {static_cast<uint32_t>(distance), static_cast<uint32_t>(first + static_cast<size_t>(lane))};
 }
 
 uint32_t MinHamming(const uint64_t* turned, const uint64_t* candidate, uint32_t rings, uint32_t sectors, uint32_t limit,

@@ -18,8 +18,8 @@ constexpr std::size_t kBlock = REVISIT_BITS_BLOCK;
 // What all parts of a search share. `limit`: some thread knows enough places that are nearer.
 struct Query {
   const PlaceStore& store;
-  const std::vector<std::uint64_t>& turned;
-  const std::vector<std::uint8_t>& turned_columns;
+  const AlignedVector<std::uint64_t>& turned;
+  const AlignedVector<std::uint8_t>& turned_columns;
   std::size_t wanted;
   std::atomic<std::uint32_t> limit;
 };
@@ -71,7 +71,7 @@ std::uint64_t between(const std::uint8_t* bounds, std::uint32_t low, std::uint32
 
 // The places [begin, end), `begin` a multiple of 64: first all bounds, then the most promising places, which bring the
 // limit down, then whatever the limit leaves.
-std::size_t search_part(Query& query, std::size_t begin, std::size_t end, std::vector<std::uint8_t>& bounds,
+std::size_t search_part(Query& query, std::size_t begin, std::size_t end, AlignedVector<std::uint8_t>& bounds,
                         std::vector<NearImage>& heap) {
   bounds.resize(std::max(bounds.size(), (end - begin + kBlock - 1) / kBlock * kBlock));
   for (std::size_t at = begin; at < end;) {
@@ -110,10 +110,10 @@ std::vector<NearImage> nearest_images(const PlaceStore& store, std::size_t place
   if (counts != nullptr) *counts = {places, 0};
   if (places == 0 || count == 0) return {};
   const auto rings = static_cast<std::uint32_t>(store.rings()), sectors = static_cast<std::uint32_t>(store.sectors());
-  thread_local std::vector<std::uint64_t> turned;
+  thread_local AlignedVector<std::uint64_t> turned;
   turned.resize(revisit_bits_turned_words(rings, sectors));
   revisit_bits_turn(query, rings, sectors, turned.data());
-  thread_local std::vector<std::uint8_t> turned_columns;
+  thread_local AlignedVector<std::uint8_t> turned_columns;
   turned_columns.resize(revisit_bits_turned_columns_bytes(sectors));
   revisit_bits_turn_columns(query, rings, sectors, turned_columns.data());
   Query shared{store, turned, turned_columns, std::min(count, places),
@@ -123,7 +123,7 @@ std::vector<NearImage> nearest_images(const PlaceStore& store, std::size_t place
   const std::size_t part_size = ((places + parts - 1) / parts + kBlock - 1) / kBlock * kBlock;
   std::vector<NearImage> result;
   if (parts == 1) {
-    thread_local std::vector<std::uint8_t> bounds;
+    thread_local AlignedVector<std::uint8_t> bounds;
     const std::size_t compared = search_part(shared, 0, places, bounds, result);
     if (counts != nullptr) counts->compared = compared;
   } else {
@@ -132,7 +132,7 @@ std::vector<NearImage> nearest_images(const PlaceStore& store, std::size_t place
     tbb::task_arena arena(std::min(threads, tbb::this_task_arena::max_concurrency()));
     arena.execute([&] {
       tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t part) {
-        thread_local std::vector<std::uint8_t> bounds;
+        thread_local AlignedVector<std::uint8_t> bounds;
         const std::size_t begin = std::min(places, part * part_size), end = std::min(places, begin + part_size);
         if (begin < end) compared += search_part(shared, begin, end, bounds, found[part]);
       });

@@ -9,6 +9,7 @@
 #include <revisit/bits/occupancy_bits.h>
 #include <revisit/core/ids.hpp>
 #include <revisit/descriptors/intensity_scan_context.hpp>
+#include <revisit/retrieval/internal/aligned_vector.hpp>
 
 namespace revisit::retrieval_internal {
 
@@ -47,7 +48,7 @@ class PlaceStore {
 
  private:
   struct Chunk {
-    std::vector<std::uint8_t> counts;     ///< [block of 64][column][place]
+    AlignedVector<std::uint8_t> counts;   ///< [block of 64][column][place]
     std::vector<std::uint64_t> images;    ///< [place][word]
     std::vector<std::uint8_t> intensity;  ///< [place][cell]
     std::vector<std::int64_t> frames;
