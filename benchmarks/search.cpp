@@ -80,6 +80,10 @@ std::uint32_t scalar_pair(const IntensityScanContext& query, const IntensityScan
                                   &shift);
 }
 
+std::size_t cell(const IntensityScanContext& of, int sector, int ring) {
+  return static_cast<std::size_t>(sector) * static_cast<std::size_t>(of.rings) + static_cast<std::size_t>(ring);
+}
+
 std::uint32_t byte_pair(const IntensityScanContext& query, const IntensityScanContext& place) {
   std::uint32_t best = UINT32_MAX;
   for (int shift = 0; shift < query.sectors; ++shift) {
@@ -87,8 +91,8 @@ std::uint32_t byte_pair(const IntensityScanContext& query, const IntensityScanCo
     for (int sector = 0; sector < query.sectors; ++sector) {
       const int other = sector + shift < query.sectors ? sector + shift : sector + shift - query.sectors;
       for (int ring = 0; ring < query.rings; ++ring) {
-        const bool q = query.intensity[static_cast<std::size_t>(sector * query.rings + ring)] > 0;
-        const bool c = place.intensity[static_cast<std::size_t>(other * query.rings + ring)] > 0;
+        const bool q = query.intensity[cell(query, sector, ring)] > 0;
+        const bool c = place.intensity[cell(place, other, ring)] > 0;
         differing += q != c;
       }
     }

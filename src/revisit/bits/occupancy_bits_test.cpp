@@ -95,16 +95,17 @@ TEST_F(EveryInstructionSet, FindsTheDistanceAndShiftOfTheReference) {
   for (const int64_t target : supported_instruction_sets()) {
     force_instruction_set(target);
     SCOPED_TRACE(revisit::instruction_set_name());
-    for (const auto& [rings, sectors] : {std::pair{60u, 20u},
-                                         {20u, 60u},
-                                         {1u, 1u},
-                                         {3u, 5u},
-                                         {64u, 1u},
-                                         {1u, 64u},
-                                         {64u, 64u},
-                                         {7u, 37u},
-                                         {65u, 130u}})
+    for (const auto& grid : {std::pair{60u, 20u},
+                             {20u, 60u},
+                             {1u, 1u},
+                             {3u, 5u},
+                             {64u, 1u},
+                             {1u, 64u},
+                             {64u, 64u},
+                             {7u, 37u},
+                             {65u, 130u}})
       for (int trial = 0; trial < 10; ++trial) {
+        const uint32_t rings = grid.first, sectors = grid.second;
         const Image query = random_image(rings, sectors, 0.4, generator);
         // Unlike, alike, and turned: the last have several shifts of equal distance.
         Image candidate = trial < 4 ? random_image(rings, sectors, 0.3, generator) : query.turned(trial % sectors);
@@ -151,7 +152,7 @@ uint32_t bound_by_definition(const Image& query, const Image& place) {
 TEST_F(EveryInstructionSet, BoundsAreThoseOfTheDefinitionAndNeverAboveTheDistance) {
   std::mt19937 generator(4);
   for (const auto& [rings, sectors] : {std::pair{60u, 20u}, {20u, 60u}, {3u, 5u}, {64u, 64u}, {7u, 37u}}) {
-    constexpr size_t kPlaces = 2 * REVISIT_BITS_BLOCK;
+    constexpr size_t kPlaces = size_t{2} * REVISIT_BITS_BLOCK;
     const Image query = random_image(rings, sectors, 0.5, generator);
     std::vector<uint8_t> turned_columns(revisit_bits_turned_columns_bytes(sectors));
     revisit_bits_turn_columns(query.packed().data(), rings, sectors, turned_columns.data());

@@ -49,7 +49,9 @@ class Places {
 
  private:
   double uniform() { return std::uniform_real_distribution<double>()(random_); }
-  std::size_t cell(int sector, int ring) const { return static_cast<std::size_t>(sector * grid_.rings + ring); }
+  std::size_t cell(int sector, int ring) const {
+    return static_cast<std::size_t>(sector) * static_cast<std::size_t>(grid_.rings) + static_cast<std::size_t>(ring);
+  }
   IntensityScanContext empty() const {
     IntensityScanContext context;
     context.rings = grid_.rings;
@@ -105,13 +107,13 @@ TEST_P(NearestImages, AreThoseOfComparingAll) {
     Places places(GetParam(), 5 + static_cast<unsigned>(kind));
     PlaceStore store;
     std::vector<IntensityScanContext> seen;
-    for (int i = 0; i < 400; ++i) {
+    for (std::size_t i = 0; i < 400; ++i) {
       // Random ones, clustered ones, and many that are alike to the bit.
       const bool again = kind > 0 && i % 4 != 0;
-      seen.push_back(again       ? places.again(seen[static_cast<std::size_t>(i / 4 * 4)], kind == 2 ? 0.0 : 0.05)
-                     : kind == 0 ? places.even(0.002 * i)
+      seen.push_back(again       ? places.again(seen[i / 4 * 4], kind == 2 ? 0.0 : 0.05)
+                     : kind == 0 ? places.even(0.002 * static_cast<double>(i))
                                  : places.as_scans_are());
-      store.add(FrameId{i}, 0.1 * i, seen.back());
+      store.add(FrameId{static_cast<std::int64_t>(i)}, 0.1 * static_cast<double>(i), seen.back());
     }
     std::size_t compared = 0, searched = 0;
     for (const std::size_t q : {0u, 101u, 399u}) {
@@ -145,6 +147,7 @@ INSTANTIATE_TEST_SUITE_P(Grids, NearestImages, testing::Values(Grid{60, 20}, Gri
 TEST(PlaceStore, IsSearchedWhileItGrows) {
   Places places({60, 20}, 9);
   std::vector<IntensityScanContext> seen;
+  seen.reserve(6000);
   for (int i = 0; i < 6000; ++i)
     seen.push_back(i < 40 ? places.as_scans_are() : seen[static_cast<std::size_t>(i % 40)]);
   PlaceStore store;
