@@ -29,7 +29,7 @@ float texture(const Eigen::Vector3f& p, float cells_per_metre) {
 struct Scanner::Sweep {
   double time_s = 0.0;
   std::uint64_t key = 0;
-  std::vector<Eigen::Matrix<float, 3, 4>> T_world_lidar;  ///< of each column (rotating), of each beam chunk (rosette)
+  std::vector<Eigen::Matrix<float, 3, 4>> T_world_lidar;  ///< of each column; one where nothing moves
   std::vector<float> cos_azimuth, sin_azimuth;            ///< of each column
   Solids moving;
   std::unique_ptr<RayScene> scene;  ///< of what moves

@@ -26,8 +26,8 @@ struct Mover {
   VehicleKind vehicle = VehicleKind::kCar;
   std::uint64_t seed = 0;
   double from_s = 0.0, until_s = 0.0;
-  double arc_m = 0.0,
-         speed_mps = 0.0;  ///< at from_s; a negative speed drives against the path; kAhead: arc_m is the least gap
+  double arc_m = 0.0;      ///< along the path, at from_s; kAhead: the least gap, negative behind
+  double speed_mps = 0.0;  ///< negative: against the path
   double left_m = 0.0;
   Knot begin, end;           ///< kToAndFro
   bool steps_aside = false;  ///< keeps a metre from the sensor's vehicle, however near it comes
