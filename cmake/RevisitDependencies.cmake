@@ -7,6 +7,7 @@ find_package(TBB 2021 REQUIRED)
 find_package(embree 3 REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(HWY REQUIRED IMPORTED_TARGET libhwy)
+pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
 
 # PCL's own package file searches for VTK, Qt and more; the five libraries used here need none of them at build time.
 if(NOT TARGET revisit_pcl)

@@ -31,7 +31,7 @@ int main(int argc, char** argv) {
     std::printf("%s: %zu points, rings %s\n", argv[i + 1], scan->points.size(), to_string(ground.rings).c_str());
   }
   index.add(revisit::FrameId{0}, 0.0, descriptors[0]);
-  const auto candidates = index.search_all(descriptors[1]);
+  const auto candidates = *index.search_all(descriptors[1]);
   std::printf("geometry %.3f, intensity %.3f, yaw %.0f degrees\n", candidates[0].geometry_score,
               candidates[0].intensity_score, revisit::to_degrees(candidates[0].yaw_rad));
   const auto evidence =

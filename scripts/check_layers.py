@@ -31,6 +31,8 @@ ALLOWED = {
 DOORS = {
     "pcl/": {"src/revisit/io", "src/revisit/registration"},
     "hwy/": {"src/revisit/bits", "src/revisit/descriptors"},
+    "xxhash": {"src/revisit/retrieval"},
+    "faiss/": {"benchmarks"},
     "nanoflann": {"src/revisit/registration"},
     "toml++": {"src/revisit/config"},
     "nlohmann/": {"src/revisit/io", "src/revisit/config", "apps"},

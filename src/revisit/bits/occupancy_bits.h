@@ -21,33 +21,56 @@ size_t revisit_bits_words(uint32_t cells);
 uint32_t revisit_bits_min_hamming(const uint64_t* query, const uint64_t* candidate, uint32_t rings, uint32_t sectors,
                                   uint32_t* best_shift);
 
-/* A query is compared with many places: it is turned once, and all its turns are then laid on a candidate together.
- * Words [word][turn], turns filled up to a multiple of 8. Buffers that start on a cache line are read twice as fast. */
-size_t revisit_bits_turned_words(uint32_t rings, uint32_t sectors);
-void revisit_bits_turn(const uint64_t* query, uint32_t rings, uint32_t sectors, uint64_t* turned);
-
-/* revisit_bits_min_hamming by the fastest instructions of the processor. Gives up as soon as the distance cannot be
- * below `limit` (UINT32_MAX: never): then UINT32_MAX, and *best_shift is left alone. */
-uint32_t revisit_bits_min_hamming_turned(const uint64_t* turned, const uint64_t* candidate, uint32_t rings,
-                                         uint32_t sectors, uint32_t limit, uint32_t* best_shift);
-
-/* How many cells are occupied in each of 20 columns, which are neighbouring sectors taken together (fewer sectors,
- * fewer columns; the rest is 0), at most 255 counted. The differences of these counts between a turned query and a
- * place sum to no more than the cells that differ: the smallest sum over all turns is a lower bound of the distance
+/* A place: what is known of it beside its image, and the image, which follows at once, filled up with zeros to a multiple
+ * of 8 words. Counts of occupied cells are of regions and cut at 255; from them follow lower bounds of distances
  * (docs/retrieval.md). */
-#define REVISIT_BITS_COLUMNS 20
+#define REVISIT_BITS_COLUMNS 20 /* neighbouring sectors taken together; fewer sectors, fewer columns */
+#define REVISIT_BITS_REGIONS 40 /* the inner and the outer rings of each column */
+typedef struct {
+  uint8_t fine[REVISIT_BITS_REGIONS]; /* [column][inner, outer] */
+  uint32_t occupied;
+  uint32_t unused;
+} revisit_bits_place;
+size_t revisit_bits_place_bytes(uint32_t rings, uint32_t sectors);
+void revisit_bits_make_place(const uint64_t* image, uint32_t rings, uint32_t sectors, revisit_bits_place* place,
+                             uint8_t columns[REVISIT_BITS_COLUMNS]);
+
+/* A query, prepared for comparisons with many places: all its turns, up to 1,024, and the counts of all of them. */
 #define REVISIT_BITS_BLOCK 64
-void revisit_bits_columns(const uint64_t* image, uint32_t rings, uint32_t sectors,
-                          uint8_t counts[REVISIT_BITS_COLUMNS]);
+typedef struct {
+  uint32_t rings, sectors, occupied;
+  const uint64_t* images; /* [turn][word], words filled up to a multiple of 8 */
+  const uint8_t* coarse;  /* [turn][column] */
+  const uint8_t* fine;    /* [region / 8][turn][region % 8], turns filled up to a multiple of 8 */
+} revisit_bits_query;
+/* `memory` of that many bytes, on a cache line, holds what the query points to. */
+size_t revisit_bits_query_bytes(uint32_t rings, uint32_t sectors);
+void revisit_bits_prepare(const uint64_t* image, uint32_t rings, uint32_t sectors, void* memory,
+                          revisit_bits_query* query);
 
-/* The columns of all turns of a query, each count repeated for every place of a block: [turn][column][64]. */
-size_t revisit_bits_turned_columns_bytes(uint32_t sectors);
-void revisit_bits_turn_columns(const uint64_t* query, uint32_t rings, uint32_t sectors, uint8_t* turned);
+/* Half of a lower bound (2 h <= distance, h at most 255) for each place of `blocks` blocks of 64 places, and the least
+ * of each block. `coarse` holds [block][column][place of 64] and starts on a cache line, `occupied` one number a
+ * place. */
+void revisit_bits_half_bounds(const revisit_bits_query* query, const uint8_t* coarse, const uint32_t* occupied,
+                              size_t blocks, uint8_t* half_bounds, uint8_t* least);
 
-/* Lower bounds, at most 255, of the distances of a query to the places of `blocks` blocks. `counts` holds for each
- * block [column][place of 64], `bounds` one byte a place. */
-void revisit_bits_bounds(const uint8_t* turned, uint32_t sectors, const uint8_t* counts, size_t blocks,
-                         uint8_t* bounds);
+/* Which of 64 bytes lie in [low, most], low <= most: one bit each. */
+uint64_t revisit_bits_between(const uint8_t bytes[REVISIT_BITS_BLOCK], uint8_t low, uint8_t most);
+
+/* The distance at that turn whose bound is least: the minimum is at most this. */
+uint32_t revisit_bits_hamming_at_promising_turn(const revisit_bits_query* query, const revisit_bits_place* place);
+
+/* revisit_bits_min_hamming of a query and up to 64 places, one after the other from `places` on, `place_bytes` apart:
+ * those named by the bits of `which`. Only turns whose bound allows a distance below `limit` are compared. Returned are
+ * the places that are below it, one bit each; for these, distances and shifts are those of revisit_bits_min_hamming. */
+uint64_t revisit_bits_compare(const revisit_bits_query* query, const revisit_bits_place* places, size_t place_bytes,
+                              uint64_t which, uint32_t limit, uint32_t distances[REVISIT_BITS_BLOCK],
+                              uint32_t shifts[REVISIT_BITS_BLOCK]);
+
+/* For two polar images of one byte a cell, the query turned by `shift` sectors: for each sector of the query the sums
+ * over its rings of q * q, c * c and q * c. `sums` has room for 3 * sectors; rings <= 66,000 cannot overflow. */
+void revisit_bits_sector_products(const uint8_t* query, const uint8_t* candidate, uint32_t rings, uint32_t sectors,
+                                  uint32_t shift, uint32_t* sums);
 
 #ifdef __cplusplus
 }

@@ -20,21 +20,20 @@ GeometryMatch match_geometry(const DescriptorView& query, const DescriptorView& 
 }
 
 double match_intensity(const DescriptorView& query, const DescriptorView& candidate, int shift_columns) {
-  const auto rings = static_cast<std::size_t>(query.rings);
+  // Integers in SIMD; only the quotients are floating point.
+  constexpr std::size_t kMostSectors = 720;
+  std::uint32_t products[3 * kMostSectors];
+  const auto sectors = static_cast<std::size_t>(query.sectors);
+  if (sectors > kMostSectors) throw std::invalid_argument("descriptors have up to 720 sectors");
+  revisit_bits_sector_products(query.intensity, candidate.intensity, static_cast<std::uint32_t>(query.rings),
+                               static_cast<std::uint32_t>(sectors), static_cast<std::uint32_t>(shift_columns), products);
   double sum = 0.0;
   int counted = 0;
-  for (int j = 0; j < query.sectors; ++j) {
-    const std::uint8_t* q = query.intensity + static_cast<std::size_t>(j) * rings;
-    const std::uint8_t* c = candidate.intensity + static_cast<std::size_t>((j + shift_columns) % query.sectors) * rings;
-    std::uint32_t qq = 0, cc = 0, qc = 0;
-    for (std::size_t i = 0; i < rings; ++i) {
-      qq += std::uint32_t{q[i]} * q[i];
-      cc += std::uint32_t{c[i]} * c[i];
-      qc += std::uint32_t{q[i]} * c[i];
-    }
-    if (qq == 0 && cc == 0) continue;
+  for (std::size_t j = 0; j < sectors; ++j) {
+    const double qq = products[3 * j], cc = products[3 * j + 1], qc = products[3 * j + 2];
+    if (qq == 0.0 && cc == 0.0) continue;
     ++counted;
-    if (qq != 0 && cc != 0) sum += qc / (std::sqrt(static_cast<double>(qq)) * std::sqrt(static_cast<double>(cc)));
+    if (qq != 0.0 && cc != 0.0) sum += qc / std::sqrt(qq * cc);  // the product is exact: below 2^53
   }
   return counted == 0 ? 0.0 : sum / counted;
 }

@@ -33,7 +33,8 @@ LoopDetector::LoopDetector(const Parameters& parameters, std::optional<Intensity
 Result<Detection> LoopDetector::process(Scan scan, const std::optional<Pose>& T_world_lidar) {
   auto prepared = prepare(std::move(scan));
   if (!prepared) return prepared.error();
-  Detection detection = detect(*prepared, T_world_lidar, Past::kOldEnough);
+  auto detection = detect(*prepared, T_world_lidar, Past::kOldEnough);
+  if (!detection) return detection.error();
   remember(*std::move(prepared), T_world_lidar);
   return detection;
 }
@@ -72,7 +73,7 @@ Result<PreparedScan> LoopDetector::prepare(Scan scan) {
   return prepared;
 }
 
-Detection LoopDetector::detect(const PreparedScan& prepared, const std::optional<Pose>& T_world_lidar, Past past) {
+Result<Detection> LoopDetector::detect(const PreparedScan& prepared, const std::optional<Pose>& T_world_lidar, Past past) {
   Detection detection;
   detection.frame = prepared.scan.frame;
   detection.points = prepared.scan.points.size();
@@ -85,8 +86,10 @@ Detection LoopDetector::detect(const PreparedScan& prepared, const std::optional
   const double stamp_s = prepared.scan.stamp_s;
   detection.had_searchable_past =
       past == Past::kAll ? index_.size() > 0 : index_.has_searchable_past(detection.frame, stamp_s);
-  detection.candidates = past == Past::kAll ? index_.search_all(prepared.descriptor)
-                                            : index_.search(detection.frame, stamp_s, prepared.descriptor);
+  auto candidates = past == Past::kAll ? index_.search_all(prepared.descriptor)
+                                       : index_.search(detection.frame, stamp_s, prepared.descriptor);
+  if (!candidates) return candidates.error();
+  detection.candidates = *std::move(candidates);
   detection.search_ms = watch.lap_ms();
   if (detection.candidates.empty())
     detection.reason = detection.had_searchable_past ? "no place like it" : "no searchable past";

@@ -65,7 +65,7 @@ class LoopDetector {
   enum class Past { kOldEnough, kAll };
 
   Result<PreparedScan> prepare(Scan scan);
-  Detection detect(const PreparedScan& prepared, const std::optional<Pose>& T_world_lidar, Past past);
+  Result<Detection> detect(const PreparedScan& prepared, const std::optional<Pose>& T_world_lidar, Past past);
   void verify(Detection& detection, const PreparedScan& prepared);
   void remember(PreparedScan prepared, const std::optional<Pose>& T_world_lidar);
 

@@ -15,131 +15,177 @@ namespace {
 
 constexpr std::size_t kBlock = REVISIT_BITS_BLOCK;
 
-// What all parts of a search share. `limit`: some thread knows enough places that are nearer.
+constexpr std::size_t kIntact = SIZE_MAX;
+// Fewer places than this for each thread are not worth waking it up.
+constexpr std::size_t kPlacesPerThread = 8192;
+
+// What all parts of a search share.
 struct Query {
   const PlaceStore& store;
-  const AlignedVector<std::uint64_t>& turned;
-  const AlignedVector<std::uint8_t>& turned_columns;
+  const revisit_bits_query& prepared;
   std::size_t wanted;
-  std::atomic<std::uint32_t> limit;
+  std::atomic<std::uint32_t> limit;             ///< some thread knows enough places that are nearer
+  std::atomic<std::size_t> damaged = kIntact;  ///< a place whose image was refused
 };
 
-// The best so far, the worst of them on top.
-class Best {
+// Brings the shared limit down to `limit`.
+void lower(std::atomic<std::uint32_t>& shared, std::uint32_t limit) {
+  std::uint32_t known = shared.load(std::memory_order_relaxed);
+  while (limit < known && !shared.compare_exchange_weak(known, limit, std::memory_order_relaxed)) {
+  }
+}
+
+// Reused from search to search by each thread.
+struct Scratch {
+  AlignedVector<std::uint8_t> half_bounds, least;  ///< of places, of blocks
+  std::vector<std::uint32_t> upper_bounds;
+};
+
+// The places [begin, end) of a query, `begin` a multiple of 64.
+class Part {
  public:
-  Best(Query& query, std::vector<NearImage>& heap) : query_(query), heap_(heap) { heap_.clear(); }
+  Part(Query& query, std::size_t begin, std::size_t end, std::vector<NearImage>& heap)
+      : query_(query), begin_(begin), end_(end), blocks_((end - begin + kBlock - 1) / kBlock), heap_(heap) {}
 
-  std::uint32_t limit() const { return query_.limit.load(std::memory_order_relaxed); }
+  // Returns how many places were compared.
+  std::size_t search() {
+    find_bounds();
+    const std::uint32_t near = promising_half_bound();
+    limit_by_promising_turns(near);
+    compare(0, near);
+    if (near < 255) compare(near + 1, 255);
+    return compared_;
+  }
 
-  void compare(std::size_t place) {
-    NearImage found;
-    found.place = place;
-    found.distance = revisit_bits_min_hamming_turned(
-        query_.turned.data(), query_.store.image(place), static_cast<std::uint32_t>(query_.store.rings()),
-        static_cast<std::uint32_t>(query_.store.sectors()), limit(), &found.shift);
-    ++compared_;
-    if (found.distance == UINT32_MAX) return;
+ private:
+  void find_bounds() {
+    thread_local Scratch scratch;
+    scratch_ = &scratch;
+    scratch.half_bounds.resize(std::max(scratch.half_bounds.size(), blocks_ * kBlock));
+    scratch.least.resize(std::max(scratch.least.size(), blocks_));
+    for (std::size_t at = begin_; at < end_;) {
+      const std::size_t stop = std::min(end_, (at / PlaceStore::kChunk + 1) * PlaceStore::kChunk);
+      query_.store.half_bounds(query_.prepared, at, stop, scratch.half_bounds.data() + (at - begin_),
+                               scratch.least.data() + (at - begin_) / kBlock);
+      at = stop;
+    }
+  }
+
+  // So many blocks have a half bound up to this that the places wanted are likely among theirs.
+  std::uint32_t promising_half_bound() const {
+    std::array<std::uint32_t, 256> histogram{};
+    for (std::size_t block = 0; block < blocks_; ++block) ++histogram[scratch_->least[block]];
+    const std::size_t promising = std::min(blocks_, query_.wanted + 8);
+    std::uint32_t near = 0;
+    for (std::size_t sum = 0; near < 255 && (sum += histogram[near]) < promising;) ++near;
+    return near;
+  }
+
+  // Calls visit(first place of the block, which of its places) for half bounds in [low, high] that the limit allows.
+  template <typename Visit>
+  void for_each_block(std::uint32_t low, std::uint32_t high, Visit visit) {
+    for (std::size_t block = 0; block < blocks_; ++block) {
+      // 2 h < limit, as far as there is one
+      const std::uint32_t limit = query_.limit.load(std::memory_order_relaxed);
+      const std::uint32_t below = std::min(high + 1, limit / 2 + limit % 2);
+      if (scratch_->least[block] >= below || below <= low) continue;
+      std::uint64_t which =
+          revisit_bits_between(scratch_->half_bounds.data() + block * kBlock, static_cast<std::uint8_t>(low),
+                               static_cast<std::uint8_t>(below - 1));
+      const std::size_t here = end_ - begin_ - block * kBlock;
+      if (here < kBlock) which &= (std::uint64_t{1} << here) - 1;
+      if (which != 0) visit(begin_ + block * kBlock, which);
+    }
+  }
+
+  // Each promising place is at most as far as at its most promising turn: the K-th of these distances is a limit.
+  void limit_by_promising_turns(std::uint32_t near) {
+    std::vector<std::uint32_t>& upper = scratch_->upper_bounds;
+    upper.clear();
+    for_each_block(0, near, [&](std::size_t first, std::uint64_t which) {
+      for (; which != 0 && upper.size() < 2 * query_.wanted + 16; which &= which - 1) {
+        const revisit_bits_place* const place = query_.store.place(first + static_cast<std::size_t>(std::countr_zero(which)));
+        if (place != nullptr) upper.push_back(revisit_bits_hamming_at_promising_turn(&query_.prepared, place));
+      }
+    });
+    if (upper.size() < query_.wanted) return;
+    const auto last = upper.begin() + static_cast<std::ptrdiff_t>(query_.wanted) - 1;
+    std::nth_element(upper.begin(), last, upper.end());
+    lower(query_.limit, *last + 1);
+  }
+
+  void compare(std::uint32_t low, std::uint32_t high) {
+    for_each_block(low, high, [&](std::size_t first, std::uint64_t which) {
+      const revisit_bits_place* const places = query_.store.place(first);
+      if (places == nullptr) {
+        query_.damaged.store(first, std::memory_order_relaxed);
+        return;
+      }
+      compared_ += static_cast<std::size_t>(std::popcount(which));
+      std::uint32_t distances[kBlock], shifts[kBlock];
+      std::uint64_t found = revisit_bits_compare(&query_.prepared, places, query_.store.place_bytes(), which,
+                                                 query_.limit.load(std::memory_order_relaxed), distances, shifts);
+      for (; found != 0; found &= found - 1) {
+        const auto i = static_cast<std::size_t>(std::countr_zero(found));
+        keep({distances[i], shifts[i], first + i});
+      }
+    });
+  }
+
+  // The heap holds the best so far, the worst of them on top.
+  void keep(const NearImage& place) {
     if (heap_.size() == query_.wanted) {
-      if (!(found < heap_.front())) return;
+      if (!(place < heap_.front())) return;
       std::pop_heap(heap_.begin(), heap_.end());
       heap_.pop_back();
     }
-    heap_.push_back(found);
+    heap_.push_back(place);
     std::push_heap(heap_.begin(), heap_.end());
-    if (heap_.size() < query_.wanted) return;
     // Equal distances may still win by age: the limit is one more than the worst.
-    const std::uint32_t worst = heap_.front().distance + 1;
-    std::uint32_t known = limit();
-    while (worst < known && !query_.limit.compare_exchange_weak(known, worst, std::memory_order_relaxed)) {
-    }
+    if (heap_.size() == query_.wanted) lower(query_.limit, heap_.front().distance + 1);
   }
-  std::size_t compared() const { return compared_; }
 
- private:
   Query& query_;
+  std::size_t begin_, end_, blocks_, compared_ = 0;
   std::vector<NearImage>& heap_;
-  std::size_t compared_ = 0;
+  Scratch* scratch_ = nullptr;
 };
-
-// Which of 64 bounds lie in [low, high): one bit each.
-std::uint64_t between(const std::uint8_t* bounds, std::uint32_t low, std::uint32_t high) {
-  std::uint64_t mask = 0;
-  for (std::size_t i = 0; i < kBlock; ++i)
-    mask |= std::uint64_t{static_cast<std::uint32_t>(bounds[i]) - low < high - low} << i;
-  return mask;
-}
-
-// The places [begin, end), `begin` a multiple of 64: first all bounds, then the most promising places, which bring the
-// limit down, then whatever the limit leaves.
-std::size_t search_part(Query& query, std::size_t begin, std::size_t end, AlignedVector<std::uint8_t>& bounds,
-                        std::vector<NearImage>& heap) {
-  bounds.resize(std::max(bounds.size(), (end - begin + kBlock - 1) / kBlock * kBlock));
-  for (std::size_t at = begin; at < end;) {
-    const std::size_t stop = std::min(end, (at / PlaceStore::kChunk + 1) * PlaceStore::kChunk);
-    query.store.bounds(query.turned_columns.data(), at, stop, bounds.data() + (at - begin));
-    at = stop;
-  }
-  std::array<std::uint32_t, 256> histogram{};
-  for (std::size_t i = 0; i < end - begin; ++i) ++histogram[bounds[i]];
-  const std::size_t promising = std::min(end - begin, 2 * query.wanted + 16);
-  std::uint32_t near = 0;
-  for (std::size_t sum = 0; near < 255 && (sum += histogram[near]) < promising;) ++near;
-
-  Best best(query, heap);
-  const auto visit = [&](std::uint32_t low, bool up_to_limit) {
-    for (std::size_t block = 0; block < end - begin; block += kBlock) {
-      const std::uint32_t high = up_to_limit ? std::min(best.limit(), 256u) : near + 1;
-      if (high <= low) continue;
-      std::uint64_t mask = between(bounds.data() + block, low, high);
-      if (end - begin - block < kBlock) mask &= (std::uint64_t{1} << (end - begin - block)) - 1;
-      for (; mask != 0; mask &= mask - 1) {
-        const std::size_t i = block + static_cast<std::size_t>(std::countr_zero(mask));
-        if (bounds[i] < best.limit()) best.compare(begin + i);
-      }
-    }
-  };
-  visit(0, false);
-  visit(near + 1, true);
-  return best.compared();
-}
 
 }  // namespace
 
-std::vector<NearImage> nearest_images(const PlaceStore& store, std::size_t places, const std::uint64_t* query,
-                                      std::size_t count, std::uint32_t farthest, int threads, SearchCounts* counts) {
+Result<std::vector<NearImage>> nearest_images(const PlaceStore& store, std::size_t places, const std::uint64_t* query,
+                                              std::size_t count, std::uint32_t farthest, int threads,
+                                              SearchCounts* counts) {
   if (counts != nullptr) *counts = {places, 0};
-  if (places == 0 || count == 0) return {};
-  const auto rings = static_cast<std::uint32_t>(store.rings()), sectors = static_cast<std::uint32_t>(store.sectors());
-  thread_local AlignedVector<std::uint64_t> turned;
-  turned.resize(revisit_bits_turned_words(rings, sectors));
-  revisit_bits_turn(query, rings, sectors, turned.data());
-  thread_local AlignedVector<std::uint8_t> turned_columns;
-  turned_columns.resize(revisit_bits_turned_columns_bytes(sectors));
-  revisit_bits_turn_columns(query, rings, sectors, turned_columns.data());
-  Query shared{store, turned, turned_columns, std::min(count, places),
-               farthest == UINT32_MAX ? farthest : farthest + 1};
-
-  const auto parts = static_cast<std::size_t>(std::max(1, threads));
-  const std::size_t part_size = ((places + parts - 1) / parts + kBlock - 1) / kBlock * kBlock;
   std::vector<NearImage> result;
+  if (places == 0 || count == 0) return result;
+  const auto rings = static_cast<std::uint32_t>(store.rings()), sectors = static_cast<std::uint32_t>(store.sectors());
+  thread_local AlignedVector<std::uint8_t> memory;
+  memory.resize(std::max(memory.size(), revisit_bits_query_bytes(rings, sectors)));
+  revisit_bits_query prepared;
+  revisit_bits_prepare(query, rings, sectors, memory.data(), &prepared);
+  Query shared{store, prepared, std::min(count, places), farthest == UINT32_MAX ? farthest : farthest + 1};
+
+  const std::size_t parts = std::clamp<std::size_t>(places / kPlacesPerThread, 1, static_cast<std::size_t>(std::max(1, threads)));
+  std::size_t compared = 0;
   if (parts == 1) {
-    thread_local AlignedVector<std::uint8_t> bounds;
-    const std::size_t compared = search_part(shared, 0, places, bounds, result);
-    if (counts != nullptr) counts->compared = compared;
+    compared = Part(shared, 0, places, result).search();
   } else {
+    const std::size_t part_size = ((places + parts - 1) / parts + kBlock - 1) / kBlock * kBlock;
     std::vector<std::vector<NearImage>> found(parts);
-    std::atomic<std::size_t> compared = 0;
+    std::atomic<std::size_t> sum = 0;
     tbb::task_arena arena(std::min(threads, tbb::this_task_arena::max_concurrency()));
     arena.execute([&] {
       tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t part) {
-        thread_local AlignedVector<std::uint8_t> bounds;
         const std::size_t begin = std::min(places, part * part_size), end = std::min(places, begin + part_size);
-        if (begin < end) compared += search_part(shared, begin, end, bounds, found[part]);
+        if (begin < end) sum += Part(shared, begin, end, found[part]).search();
       });
     });
     for (const auto& each : found) result.insert(result.end(), each.begin(), each.end());
-    if (counts != nullptr) counts->compared = compared;
+    compared = sum;
   }
+  if (shared.damaged != kIntact) return store.damage(shared.damaged);
+  if (counts != nullptr) counts->compared = compared;
   std::sort(result.begin(), result.end());
   result.resize(std::min(result.size(), count));
   return result;

@@ -75,7 +75,7 @@ std::vector<NearImage> compare_all(const PlaceStore& store, const IntensityScanC
   for (std::size_t i = 0; i < all.size(); ++i) {
     all[i].place = i;
     all[i].distance =
-        revisit_bits_min_hamming(query.occupancy.data(), store.image(i), static_cast<std::uint32_t>(query.rings),
+        revisit_bits_min_hamming(query.occupancy.data(), PlaceStore::image_of(store.place(i)), static_cast<std::uint32_t>(query.rings),
                                  static_cast<std::uint32_t>(query.sectors), &all[i].shift);
   }
   return all;
@@ -124,7 +124,7 @@ TEST_P(NearestImages, AreThoseOfComparingAll) {
           for (const std::uint32_t farthest : {UINT32_MAX, 60u, 0u})
             for (const int threads : {1, 3}) {
               SearchCounts counts;
-              expect_same(nearest_images(store, among, query.occupancy.data(), count, farthest, threads, &counts),
+              expect_same(*nearest_images(store, among, query.occupancy.data(), count, farthest, threads, &counts),
                           nearest_of(all, among, count, farthest));
               EXPECT_EQ(counts.places, among);
               if (count == 1 && among == 400) {
@@ -158,7 +158,7 @@ TEST(PlaceStore, IsSearchedWhileItGrows) {
   std::size_t size = 0;
   while (size < 6000) {
     size = store.size();
-    const auto found = nearest_images(store, size, seen[0].occupancy.data(), 3, UINT32_MAX);
+    const auto found = *nearest_images(store, size, seen[0].occupancy.data(), 3, UINT32_MAX);
     ASSERT_EQ(found[0].place, 0u);
     ASSERT_EQ(found[0].distance, 0u);
     if (found.size() > 1 && size > 40) {

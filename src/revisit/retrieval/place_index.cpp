@@ -39,9 +39,9 @@ std::size_t prefix(std::size_t size, Test passes) {
 
 }  // namespace
 
-struct PlaceIndex::Store : retrieval_internal::PlaceStore {};
-
-PlaceIndex::PlaceIndex(const RetrievalOptions& options) : options_(options), store_(std::make_unique<Store>()) {}
+PlaceIndex::PlaceIndex(const RetrievalOptions& options) : PlaceIndex(options, std::make_unique<Store>()) {}
+PlaceIndex::PlaceIndex(const RetrievalOptions& options, std::unique_ptr<Store> store)
+    : options_(options), store_(std::move(store)) {}
 PlaceIndex::~PlaceIndex() = default;
 PlaceIndex::PlaceIndex(PlaceIndex&&) noexcept = default;
 PlaceIndex& PlaceIndex::operator=(PlaceIndex&&) noexcept = default;
@@ -62,36 +62,39 @@ std::size_t PlaceIndex::old_enough(FrameId frame, double stamp_s) const {
 
 bool PlaceIndex::has_searchable_past(FrameId frame, double stamp_s) const { return old_enough(frame, stamp_s) > 0; }
 
-std::vector<LoopCandidate> PlaceIndex::search(FrameId frame, double stamp_s, const IntensityScanContext& query,
+Result<std::vector<LoopCandidate>> PlaceIndex::search(FrameId frame, double stamp_s, const IntensityScanContext& query,
                                               int threads, SearchEffort* effort) const {
   return rank(old_enough(frame, stamp_s), query, threads, effort);
 }
 
-std::vector<LoopCandidate> PlaceIndex::search_all(const IntensityScanContext& query, int threads,
+Result<std::vector<LoopCandidate>> PlaceIndex::search_all(const IntensityScanContext& query, int threads,
                                                   SearchEffort* effort) const {
   return rank(store_->size(), query, threads, effort);
 }
 
-std::vector<LoopCandidate> PlaceIndex::rank(std::size_t places, const IntensityScanContext& query, int threads,
+Result<std::vector<LoopCandidate>> PlaceIndex::rank(std::size_t places, const IntensityScanContext& query, int threads,
                                             SearchEffort* effort) const {
   if (places > 0 && (query.rings != store_->rings() || query.sectors != store_->sectors()))
     throw std::invalid_argument("descriptors of different grids cannot be compared");
   const auto shortlist = options_.shortlist == 0 ? places : static_cast<std::size_t>(options_.shortlist);
   retrieval_internal::SearchCounts counts;
-  const auto near = retrieval_internal::nearest_images(*store_, places, query.occupancy.data(), shortlist,
+  const auto nearest = retrieval_internal::nearest_images(*store_, places, query.occupancy.data(), shortlist,
                                                        farthest_distance(options_.min_geometry_score, query.cells()),
                                                        threads, &counts);
+  if (!nearest) return nearest.error();
   if (effort != nullptr) *effort = {counts.places, counts.compared};
 
   std::vector<LoopCandidate> candidates;
-  candidates.reserve(near.size());
-  for (const auto& each : near) {
+  candidates.reserve(nearest->size());
+  for (const auto& each : *nearest) {
     LoopCandidate candidate;
     candidate.match = store_->frame(each.place);
     candidate.geometry_score = geometry_score(each.distance, query.cells());
     candidate.shift_columns = static_cast<int>(each.shift);
     candidate.yaw_rad = yaw_of_shift(candidate.shift_columns, query.sectors);
-    candidate.intensity_score = match_intensity(query, store_->descriptor(each.place), candidate.shift_columns);
+    const auto descriptor = store_->descriptor(each.place);
+    if (!descriptor) return store_->damage(each.place);
+    candidate.intensity_score = match_intensity(query, *descriptor, candidate.shift_columns);
     if (candidate.intensity_score >= options_.min_intensity_score) candidates.push_back(candidate);
   }
   std::sort(candidates.begin(), candidates.end(), [](const LoopCandidate& a, const LoopCandidate& b) {
@@ -106,6 +109,15 @@ std::optional<DescriptorView> PlaceIndex::find(FrameId frame) const {
   const std::size_t i = prefix(size, [&](std::size_t at) { return store_->frame(at) < frame; });
   if (i == size || store_->frame(i) != frame) return std::nullopt;
   return store_->descriptor(i);
+}
+
+Status PlaceIndex::save(const std::string& path) const { return store_->save(path); }
+Status PlaceIndex::check() const { return store_->check(); }
+
+Result<PlaceIndex> PlaceIndex::open(const std::string& path, const RetrievalOptions& options) {
+  auto store = Store::open(path);
+  if (!store) return store.error();
+  return PlaceIndex(options, *std::move(store));
 }
 
 }  // namespace revisit

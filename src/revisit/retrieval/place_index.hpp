@@ -3,13 +3,18 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <revisit/config/parameters.hpp>
 #include <revisit/core/loop.hpp>
+#include <revisit/core/result.hpp>
 #include <revisit/descriptors/intensity_scan_context.hpp>
 
 namespace revisit {
+namespace retrieval_internal {
+class PlaceStore;
+}
 
 /// How much of an index a search looked at.
 struct SearchEffort {
@@ -22,6 +27,9 @@ struct SearchEffort {
 /// whole allowed past, then intensity for those of best geometry score. The answer is that of comparing every place
 /// (docs/retrieval.md). Some 1.4 kB a place on grids of 1200 cells; nothing moves as it grows.
 /// One thread may add while any number of others search.
+/// An index can be saved, and opened again in milliseconds however large it is: it is mapped, not read. What is mapped is
+/// checked before it is used: a search that meets altered bytes gives an error that names the file. A file that is
+/// shortened while it is mapped ends the program, as with any mapped file; replacing it is fine.
 class PlaceIndex {
  public:
   explicit PlaceIndex(const RetrievalOptions& options);
@@ -35,24 +43,33 @@ class PlaceIndex {
   /// The best places for a query at `frame` and `stamp_s`, best first by geometry plus intensity score (ties: the
   /// earlier frame). Searched are places at least exclude_frames frames and exclude_s seconds before the query; where
   /// stamps run backwards, a place counts as old as the latest before it. `threads` share the work.
-  std::vector<LoopCandidate> search(FrameId frame, double stamp_s, const IntensityScanContext& query, int threads = 1,
-                                    SearchEffort* effort = nullptr) const;
+  Result<std::vector<LoopCandidate>> search(FrameId frame, double stamp_s, const IntensityScanContext& query,
+                                            int threads = 1, SearchEffort* effort = nullptr) const;
 
   /// The same over all places, whatever their age: a query that is no part of the recording.
-  std::vector<LoopCandidate> search_all(const IntensityScanContext& query, int threads = 1,
-                                        SearchEffort* effort = nullptr) const;
+  Result<std::vector<LoopCandidate>> search_all(const IntensityScanContext& query, int threads = 1,
+                                                SearchEffort* effort = nullptr) const;
 
   /// Whether any place is old enough for a query at this frame and time.
   bool has_searchable_past(FrameId frame, double stamp_s) const;
 
-  /// The descriptor of a frame, valid as long as the index.
+  /// The descriptor of a frame, valid as long as the index. None where the file it lies in was altered.
   std::optional<DescriptorView> find(FrameId frame) const;
+
+  /// Writes all places to a file, which is replaced only once the new one is complete. Not while a place is added.
+  Status save(const std::string& path) const;
+  /// Opens a saved index, to search and to go on adding. Refused are files that are no index, of another version, cut
+  /// off or altered.
+  static Result<PlaceIndex> open(const std::string& path, const RetrievalOptions& options);
+  /// Reads all that open() left to be checked on first use.
+  Status check() const;
   std::size_t size() const;
 
  private:
-  struct Store;
-  std::vector<LoopCandidate> rank(std::size_t places, const IntensityScanContext& query, int threads,
-                                  SearchEffort* effort) const;
+  using Store = retrieval_internal::PlaceStore;
+  PlaceIndex(const RetrievalOptions& options, std::unique_ptr<Store> store);
+  Result<std::vector<LoopCandidate>> rank(std::size_t places, const IntensityScanContext& query, int threads,
+                                          SearchEffort* effort) const;
   std::size_t old_enough(FrameId frame, double stamp_s) const;
 
   RetrievalOptions options_;

@@ -30,7 +30,7 @@ TEST(PlaceIndex, ExcludesTheRecentPastByFramesAndByTime) {
   const PlaceIndex index = filled(options, 200);
   const auto latest = [&](int frame, double stamp_s) {
     std::int64_t last = -1;
-    for (const auto& each : index.search(FrameId{frame}, stamp_s, random_context(7)))
+    for (const auto& each : *index.search(FrameId{frame}, stamp_s, random_context(7)))
       last = std::max(last, each.match.value);
     return last;
   };
@@ -43,7 +43,7 @@ TEST(PlaceIndex, ExcludesTheRecentPastByFramesAndByTime) {
 
 TEST(PlaceIndex, TheFirstPlaceCanBeFound) {
   const PlaceIndex index = filled({}, 100);
-  const auto found = index.search(FrameId{500}, 500.0, random_context(0));
+  const auto found = *index.search(FrameId{500}, 500.0, random_context(0));
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].match.value, 0);
   EXPECT_DOUBLE_EQ(found[0].geometry_score, 1.0);
@@ -59,7 +59,7 @@ TEST(PlaceIndex, RanksAsComparingAllByHand) {
   for (int i = 0; i < 120; ++i)
     by_hand.emplace_back(-match_descriptors(query, random_context(static_cast<unsigned>(i))).score(), i);
   std::sort(by_hand.begin(), by_hand.end());
-  const auto found = index.search_all(query);
+  const auto found = *index.search_all(query);
   ASSERT_EQ(found.size(), 10u);
   for (std::size_t i = 0; i < found.size(); ++i) {
     EXPECT_EQ(found[i].match.value, by_hand[i].second);
@@ -71,13 +71,13 @@ TEST(PlaceIndex, GatesAndShortlistAreKept) {
   RetrievalOptions options;
   options.top_k = 1000;
   options.shortlist = 7;
-  EXPECT_EQ(filled(options, 100).search_all(random_context(5)).size(), 7u);
+  EXPECT_EQ(filled(options, 100).search_all(random_context(5))->size(), 7u);
   options.shortlist = 0;
   options.min_geometry_score = 0.999;
-  EXPECT_EQ(filled(options, 100).search_all(random_context(5)).size(), 1u) << "itself alone";
+  EXPECT_EQ(filled(options, 100).search_all(random_context(5))->size(), 1u) << "itself alone";
   options.min_geometry_score = 0.0;
   options.min_intensity_score = 0.999;
-  EXPECT_EQ(filled(options, 100).search_all(random_context(5)).size(), 1u);
+  EXPECT_EQ(filled(options, 100).search_all(random_context(5))->size(), 1u);
 }
 
 TEST(PlaceIndex, MisuseThrows) {

@@ -8,12 +8,34 @@
 
 namespace revisit::retrieval_internal {
 
+ChunkLayout::ChunkLayout(int rings, int sectors)
+    : cells(static_cast<std::size_t>(rings) * static_cast<std::size_t>(sectors)),
+      words(revisit_bits_words(static_cast<std::uint32_t>(cells))),
+      place(revisit_bits_place_bytes(static_cast<std::uint32_t>(rings), static_cast<std::uint32_t>(sectors))) {
+  constexpr std::size_t kBytesOfBounds =
+      REVISIT_BITS_COLUMNS + sizeof(std::uint32_t) + sizeof(std::int64_t) + sizeof(double);
+  begin[kImages] = kPlaces * kBytesOfBounds;  // whole pages, for 4,096 places
+  begin[kIntensities] = begin[kImages] + kPlaces * place;
+  begin[kParts] = begin[kIntensities] + kPlaces * cells;
+}
+
 PlaceStore::~PlaceStore() {
   for (std::size_t i = 0; i < kMostChunks; ++i) {
     const Chunk* chunk = chunks_[i].load(std::memory_order_relaxed);
     if (chunk == nullptr) break;
     delete chunk;  // NOLINT(cppcoreguidelines-owning-memory): owned by this directory
   }
+}
+
+PlaceStore::Chunk& PlaceStore::append_chunk(std::size_t at, const std::uint8_t* in_file) {
+  std::unique_ptr<Chunk> fresh(new Chunk{layout_, {}, in_file});
+  if (in_file == nullptr) {
+    fresh->owned.resize(layout_.begin[ChunkLayout::kParts]);
+    fresh->data = fresh->owned.data();
+  }
+  Chunk* const chunk = fresh.release();
+  chunks_[at].store(chunk, std::memory_order_release);
+  return *chunk;
 }
 
 void PlaceStore::add(FrameId frame, double stamp_s, const IntensityScanContext& descriptor) {
@@ -27,48 +49,59 @@ void PlaceStore::add(FrameId frame, double stamp_s, const IntensityScanContext& 
   if (i == 0) {
     rings_ = descriptor.rings;
     sectors_ = descriptor.sectors;
-    words_ = descriptor.occupancy.size();
-    cells_ = descriptor.cells();
+    layout_ = {rings_, sectors_};
   }
-  if (i % kChunk == 0) {
-    auto fresh = std::make_unique<Chunk>();
-    fresh->counts.resize(kChunk * REVISIT_BITS_COLUMNS);
-    fresh->images.resize(kChunk * words_);
-    fresh->intensity.resize(kChunk * cells_);
-    fresh->frames.resize(kChunk);
-    fresh->latest_s.resize(kChunk);
-    chunks_[i / kChunk].store(fresh.release(), std::memory_order_release);
-  }
-  Chunk& chunk = *chunks_[i / kChunk].load(std::memory_order_relaxed);
+  Chunk& chunk = i % kChunk == 0 ? append_chunk(i / kChunk, nullptr)
+                                 : *chunks_[i / kChunk].load(std::memory_order_relaxed);
+  const double latest = i > 0 ? std::max(stamp_s, latest_s(i - 1)) : stamp_s;
   const std::size_t at = i % kChunk;
-  std::uint8_t counts[REVISIT_BITS_COLUMNS];
-  revisit_bits_columns(descriptor.occupancy.data(), static_cast<std::uint32_t>(rings_),
-                       static_cast<std::uint32_t>(sectors_), counts);
+  std::uint8_t* const data = chunk.owned.data();
+  const auto put = [&](const void* array, std::size_t index, const auto& value) {
+    const auto offset = static_cast<std::size_t>(static_cast<const std::uint8_t*>(array) - chunk.data);
+    std::memcpy(data + offset + index * sizeof value, &value, sizeof value);
+  };
+  auto* const place =
+      reinterpret_cast<revisit_bits_place*>(data + layout_.begin[ChunkLayout::kImages] + at * layout_.place);
+  std::uint8_t columns[REVISIT_BITS_COLUMNS];
+  revisit_bits_make_place(descriptor.occupancy.data(), static_cast<std::uint32_t>(rings_),
+                          static_cast<std::uint32_t>(sectors_), place, columns);
   for (std::size_t column = 0; column < REVISIT_BITS_COLUMNS; ++column)
-    chunk.counts[(at / REVISIT_BITS_BLOCK * REVISIT_BITS_COLUMNS + column) * REVISIT_BITS_BLOCK +
-                 at % REVISIT_BITS_BLOCK] = counts[column];
-  std::copy(descriptor.occupancy.begin(), descriptor.occupancy.end(),
-            chunk.images.begin() + static_cast<std::ptrdiff_t>(at * words_));
-  std::copy(descriptor.intensity.begin(), descriptor.intensity.end(),
-            chunk.intensity.begin() + static_cast<std::ptrdiff_t>(at * cells_));
-  chunk.frames[at] = frame.value;
-  chunk.latest_s[at] = i > 0 ? std::max(stamp_s, latest_s(i - 1)) : stamp_s;
+    data[(at / REVISIT_BITS_BLOCK * REVISIT_BITS_COLUMNS + column) * REVISIT_BITS_BLOCK + at % REVISIT_BITS_BLOCK] =
+        columns[column];
+  put(chunk.occupied(), at, place->occupied);
+  put(chunk.frames(), at, frame.value);
+  put(chunk.latest_s(), at, latest);
+  std::memcpy(data + layout_.begin[ChunkLayout::kIntensities] + at * layout_.cells, descriptor.intensity.data(),
+              layout_.cells);
   size_.store(i + 1, std::memory_order_release);
 }
 
-void PlaceStore::bounds(const std::uint8_t* turned_columns, std::size_t begin, std::size_t end,
-                        std::uint8_t* bounds) const {
-  const std::uint8_t* counts = chunk(begin).counts.data() + begin % kChunk * REVISIT_BITS_COLUMNS;
+std::optional<DescriptorView> PlaceStore::descriptor(std::size_t i) const {
+  const revisit_bits_place* const found = place(i);
+  const Chunk& c = chunk(i);
+  if (found == nullptr || !is_intact(c, ChunkLayout::kIntensities)) return std::nullopt;
+  return DescriptorView(rings_, sectors_, c.part(ChunkLayout::kIntensities) + i % kChunk * layout_.cells,
+                        image_of(found));
+}
+
+void PlaceStore::half_bounds(const revisit_bits_query& query, std::size_t begin, std::size_t end, std::uint8_t* bounds,
+                             std::uint8_t* least) const {
+  const Chunk& c = chunk(begin);
+  const std::uint8_t* coarse = c.coarse() + begin % kChunk * REVISIT_BITS_COLUMNS;
+  const std::uint32_t* occupied = c.occupied() + begin % kChunk;
   const std::size_t whole = (end - begin) / REVISIT_BITS_BLOCK, rest = (end - begin) % REVISIT_BITS_BLOCK;
-  revisit_bits_bounds(turned_columns, static_cast<std::uint32_t>(sectors_), counts, whole, bounds);
+  revisit_bits_half_bounds(&query, coarse, occupied, whole, bounds, least);
   if (rest == 0) return;
-  // The last block may be written to at this moment, beyond the places that are asked for: those alone are read.
-  counts += whole * REVISIT_BITS_COLUMNS * REVISIT_BITS_BLOCK;
-  std::uint8_t block[REVISIT_BITS_COLUMNS * REVISIT_BITS_BLOCK] = {};
+  // The last block may be written to at this moment, beyond the places that are asked for: those alone are read. The
+  // others are full: no bound is lower for them.
+  coarse += whole * REVISIT_BITS_COLUMNS * REVISIT_BITS_BLOCK;
+  alignas(64) std::uint8_t coarse_copy[REVISIT_BITS_COLUMNS * REVISIT_BITS_BLOCK] = {};
+  std::uint32_t occupied_copy[REVISIT_BITS_BLOCK];
+  std::fill(std::begin(occupied_copy), std::end(occupied_copy), query.occupied + 510);
   for (std::size_t column = 0; column < REVISIT_BITS_COLUMNS; ++column)
-    std::memcpy(block + column * REVISIT_BITS_BLOCK, counts + column * REVISIT_BITS_BLOCK, rest);
-  revisit_bits_bounds(turned_columns, static_cast<std::uint32_t>(sectors_), block, 1,
-                      bounds + whole * REVISIT_BITS_BLOCK);
+    std::memcpy(coarse_copy + column * REVISIT_BITS_BLOCK, coarse + column * REVISIT_BITS_BLOCK, rest);
+  std::copy_n(occupied + whole * REVISIT_BITS_BLOCK, rest, occupied_copy);
+  revisit_bits_half_bounds(&query, coarse_copy, occupied_copy, 1, bounds + whole * REVISIT_BITS_BLOCK, least + whole);
 }
 
 }  // namespace revisit::retrieval_internal

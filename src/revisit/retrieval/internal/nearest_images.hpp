@@ -25,9 +25,9 @@ struct SearchCounts {
 
 /// The `count` nearest of the first `places` places, at most `farthest` away, nearest first: exactly those that
 /// comparing all would give. `threads` share the work. Allocates nothing but the result once its thread has searched
-/// before.
-std::vector<NearImage> nearest_images(const PlaceStore& store, std::size_t places, const std::uint64_t* query,
-                                      std::size_t count, std::uint32_t farthest, int threads = 1,
-                                      SearchCounts* counts = nullptr);
+/// before. An error where the store lies in a file that was altered.
+Result<std::vector<NearImage>> nearest_images(const PlaceStore& store, std::size_t places, const std::uint64_t* query,
+                                              std::size_t count, std::uint32_t farthest, int threads = 1,
+                                              SearchCounts* counts = nullptr);
 
 }  // namespace revisit::retrieval_internal

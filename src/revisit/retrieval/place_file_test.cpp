@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/retrieval/place_index.hpp>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "random_points.hpp"
+
+namespace revisit {
+namespace {
+
+namespace fs = std::filesystem;
+
+IntensityScanContext random_context(unsigned seed) {
+  DescriptorOptions grid;
+  grid.rings = 12;
+  grid.sectors = 8;
+  return describe(testing_support::random_points(60, seed), grid);
+}
+
+class PlaceFile : public testing::Test {
+ protected:
+  PlaceFile() { fs::create_directories(folder); }
+  ~PlaceFile() override { fs::remove_all(folder); }
+
+  static PlaceIndex filled(int places) {
+    PlaceIndex index{options()};
+    for (int i = 0; i < places; ++i)
+      index.add(FrameId{3 * i}, 0.1 * i, random_context(static_cast<unsigned>(i % 700)));
+    return index;
+  }
+  static RetrievalOptions options() {
+    RetrievalOptions result;
+    result.top_k = 5;
+    result.shortlist = 5;
+    result.exclude_s = 0.0;
+    return result;
+  }
+  // The error of opening a file, or of using all that is in it.
+  std::string error_of(const fs::path& file) const {
+    const auto index = PlaceIndex::open(file, options());
+    if (!index) return index.error().message;
+    const Status status = index->check();
+    return status ? "" : status.error().message;
+  }
+  std::string bytes(const fs::path& of) const {
+    std::ifstream file(of, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  fs::path written(const std::string& content) const {
+    std::ofstream(folder / "other.places", std::ios::binary) << content;
+    return folder / "other.places";
+  }
+
+  const fs::path folder =
+      fs::temp_directory_path() / ("revisit_" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()) + "_" +
+                                   ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  const fs::path path = folder / "map.places";
+};
+
+TEST_F(PlaceFile, AnswersAsTheIndexThatWasSavedAndGrowsOn) {
+  for (const int places : {0, 1, 700, 4096, 9000}) {
+    PlaceIndex saved = filled(places);
+    ASSERT_TRUE(saved.save(path));
+    auto opened = PlaceIndex::open(path, options());
+    ASSERT_TRUE(opened) << opened.error().message;
+    for (int more = 0; more < 2; ++more) {  // as it was, then with another place in each
+      ASSERT_EQ(opened->size(), saved.size());
+      for (const unsigned seed : {3u, 699u, 5000u}) {
+        const auto expected = *saved.search(FrameId{100000}, 1e6, random_context(seed));
+        const auto found = opened->search(FrameId{100000}, 1e6, random_context(seed));
+        ASSERT_TRUE(found);
+        ASSERT_EQ(found->size(), expected.size());
+        for (std::size_t i = 0; i < expected.size(); ++i) {
+          EXPECT_EQ((*found)[i].match, expected[i].match);
+          EXPECT_EQ((*found)[i].score(), expected[i].score());
+        }
+      }
+      for (PlaceIndex* index : {&saved, &*opened}) index->add(FrameId{50000 + more}, 1e5, random_context(5000));
+    }
+    // Saved again over the file it is mapped from.
+    ASSERT_TRUE(opened->save(path));
+    EXPECT_EQ(PlaceIndex::open(path, options())->size(), opened->size());
+  }
+}
+
+TEST_F(PlaceFile, IsRefusedWhereverItWasAltered) {
+  ASSERT_TRUE(filled(4500).save(path));
+  const std::string good = bytes(path);
+  ASSERT_EQ(error_of(path), "");
+  // One bit at many positions: in the header, the checksums, and all parts of both chunks.
+  for (std::size_t i = 0; i < 400; ++i) {
+    const std::size_t at = i < 40 ? 4 * i : (i - 40) * (good.size() - 1) / 359;
+    std::string altered = good;
+    altered[at] = static_cast<char>(altered[at] ^ 4);
+    EXPECT_NE(error_of(written(altered)), "") << "byte " << at;
+  }
+}
+
+TEST_F(PlaceFile, IsRefusedWhenCutOff) {
+  ASSERT_TRUE(filled(200).save(path));
+  const std::string good = bytes(path);
+  for (const std::size_t size : {std::size_t{0}, std::size_t{7}, std::size_t{39}, std::size_t{4096}, good.size() - 1})
+    EXPECT_NE(error_of(written(good.substr(0, size))), "") << size;
+  EXPECT_NE(error_of(written(good + '\0')), "") << "longer";
+}
+
+TEST_F(PlaceFile, AnAlteredImageIsNoticedByTheSearchThatMeetsIt) {
+  ASSERT_TRUE(filled(5000).save(path));
+  std::string altered = bytes(path);
+  altered[4096 + 40 * 4096 + 500] ^= 1;  // after the header and the bounds of the first chunk
+  const auto index = PlaceIndex::open(written(altered), options());
+  ASSERT_TRUE(index) << "images are checked on first use";
+  const auto found = index->search_all(random_context(5));
+  ASSERT_FALSE(found);
+  EXPECT_NE(found.error().message.find("other.places: places 0 to 4095"), std::string::npos) << found.error().message;
+  EXPECT_FALSE(index->find(FrameId{0}));
+  EXPECT_FALSE(index->save(path)) << "what is damaged is not saved as sound";
+}
+
+TEST_F(PlaceFile, ErrorsSayWhatWasAllowed) {
+  ASSERT_TRUE(filled(5).save(path));
+  std::string other = bytes(path);
+  other[12] = 9;
+  EXPECT_NE(error_of(written(other)).find("version 9, this program reads version 1"), std::string::npos);
+  EXPECT_NE(error_of(written("a text file that is long enough to hold a header")).find("no place index"),
+            std::string::npos);
+  EXPECT_NE(error_of(folder).find("no regular file"), std::string::npos);
+  EXPECT_NE(error_of(folder / "absent").find("absent: "), std::string::npos);
+  EXPECT_FALSE(filled(5).save(folder / "no such folder" / "file"));
+}
+
+}  // namespace
+}  // namespace revisit
