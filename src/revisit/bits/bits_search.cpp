@@ -44,8 +44,8 @@ HWY_INLINE size_t Stride(const revisit_bits_query& query) {
   return FilledUp((size_t{query.rings} * query.sectors + 63) / 64);
 }
 
-// Lanes are places, one byte each: `kVectors` vectors of places are laid on all turns of the query. Of the differences of
-// the counts only those where the query has more are summed (docs/retrieval.md).
+// Lanes are places, one byte each: `kVectors` vectors of places are laid on all turns of the query. Of the differences
+// of the counts only those where the query has more are summed (docs/retrieval.md).
 template <size_t kVectors>
 HWY_INLINE void LayPlacesOnTurns(const revisit_bits_query& query, const uint8_t* HWY_RESTRICT counts, size_t place,
                                  uint8_t* HWY_RESTRICT sums) {
@@ -54,7 +54,8 @@ HWY_INLINE void LayPlacesOnTurns(const revisit_bits_query& query, const uint8_t*
   const uint8_t* of_vector[kVectors];
   for (size_t v = 0; v < kVectors; ++v) {
     const size_t at = place + v * width;
-    of_vector[v] = counts + at / REVISIT_BITS_BLOCK * (REVISIT_BITS_COLUMNS * REVISIT_BITS_BLOCK) + at % REVISIT_BITS_BLOCK;
+    of_vector[v] =
+        counts + at / REVISIT_BITS_BLOCK * (REVISIT_BITS_COLUMNS * REVISIT_BITS_BLOCK) + at % REVISIT_BITS_BLOCK;
   }
   auto least_0 = hn::Set(d, uint8_t{255}), least_1 = least_0, least_2 = least_0, least_3 = least_0;
   const uint8_t* HWY_RESTRICT turned = query.coarse;
@@ -63,8 +64,8 @@ HWY_INLINE void LayPlacesOnTurns(const revisit_bits_query& query, const uint8_t*
     for (size_t region = 0; region < REVISIT_BITS_COLUMNS; ++region) {
       const auto q = hn::Set(d, turned[region]);
       const auto add = [&](auto& more, size_t v) HWY_ATTR {
-        more = hn::SaturatedAdd(
-            more, hn::SaturatedSub(q, hn::Load(d, of_vector[v] + region * size_t{REVISIT_BITS_BLOCK})));
+        more = hn::SaturatedAdd(more,
+                                hn::SaturatedSub(q, hn::Load(d, of_vector[v] + region * size_t{REVISIT_BITS_BLOCK})));
       };
       add(more_0, 0);
       if constexpr (kVectors == 4) add(more_1, 1), add(more_2, 2), add(more_3, 3);

@@ -21,9 +21,9 @@ size_t revisit_bits_words(uint32_t cells);
 uint32_t revisit_bits_min_hamming(const uint64_t* query, const uint64_t* candidate, uint32_t rings, uint32_t sectors,
                                   uint32_t* best_shift);
 
-/* A place: what is known of it beside its image, and the image, which follows at once, filled up with zeros to a multiple
- * of 8 words. Counts of occupied cells are of regions and cut at 255; from them follow lower bounds of distances
- * (docs/retrieval.md). */
+/* A place: what is known of it beside its image, and the image, which follows at once, filled up with zeros to a
+ * multiple of 8 words. Counts of occupied cells are of regions and cut at 255; from them follow lower bounds of
+ * distances (docs/retrieval.md). */
 #define REVISIT_BITS_COLUMNS 20 /* neighbouring sectors taken together; fewer sectors, fewer columns */
 #define REVISIT_BITS_REGIONS 40 /* the inner and the outer rings of each column */
 typedef struct {

@@ -144,8 +144,8 @@ TEST_F(EveryInstructionSet, FindsTheDistanceAndShiftOfTheReference) {
       Image place = i % 4 == 0 ? query.turned(i % sectors) : random_image(rings, sectors, 0.01 * i, generator);
       if (i % 8 == 0) place.cells[0] = !place.cells[0];
       row.add(place);
-      expected[i] = revisit_bits_min_hamming(query.packed().data(), place.packed().data(), rings, sectors,
-                                             &expected_shift[i]);
+      expected[i] =
+          revisit_bits_min_hamming(query.packed().data(), place.packed().data(), rings, sectors, &expected_shift[i]);
       at_some_turn[i] = revisit_bits_hamming_at_promising_turn(&prepared.query, row.last());
       EXPECT_GE(at_some_turn[i], expected[i]);
     }

@@ -8,7 +8,8 @@
 namespace {
 
 constexpr uint32_t kColumns = REVISIT_BITS_COLUMNS;
-static_assert(REVISIT_BITS_REGIONS == 2 * kColumns);
+constexpr uint32_t kGroups = REVISIT_BITS_REGIONS / kColumns;
+static_assert(REVISIT_BITS_REGIONS == kGroups * kColumns && REVISIT_BITS_REGIONS % 8 == 0);
 
 // The bits set in [begin, end).
 uint32_t count_bits(const uint64_t* words, uint32_t begin, uint32_t end) {
@@ -24,19 +25,21 @@ uint32_t count_bits(const uint64_t* words, uint32_t begin, uint32_t end) {
 
 uint8_t cut(uint32_t count) { return static_cast<uint8_t>(count < 255 ? count : 255); }
 
-// Occupied cells of sectors [0, j), of their inner and their outer rings, going twice around the image.
+// The first ring of each group of rings; groups grow by one ring where the rings cannot be shared out evenly.
+uint32_t first_ring(uint32_t group, uint32_t rings) { return (group * rings + kGroups - 1) / kGroups; }
+
+// Occupied cells of sectors [0, j), by groups of rings, going twice around the image.
 struct Sums {
-  uint32_t inner, outer;
+  uint32_t of[kGroups];
 };
 void sum_sectors(const uint64_t* image, uint32_t rings, uint32_t sectors, Sums* sums) {
-  sums[0] = {0, 0};
-  const uint32_t middle = (rings + 1) / 2;
-  for (uint32_t j = 0; j < sectors; ++j) {
-    const uint32_t inner = count_bits(image, j * rings, j * rings + middle);
-    sums[j + 1] = {sums[j].inner + inner, sums[j].outer + count_bits(image, j * rings + middle, (j + 1) * rings)};
-  }
+  sums[0] = {};
   for (uint32_t j = 0; j < sectors; ++j)
-    sums[sectors + j + 1] = {sums[sectors].inner + sums[j + 1].inner, sums[sectors].outer + sums[j + 1].outer};
+    for (uint32_t g = 0; g < kGroups; ++g)
+      sums[j + 1].of[g] =
+          sums[j].of[g] + count_bits(image, j * rings + first_ring(g, rings), j * rings + first_ring(g + 1, rings));
+  for (uint32_t j = 0; j < sectors; ++j)
+    for (uint32_t g = 0; g < kGroups; ++g) sums[sectors + j + 1].of[g] = sums[sectors].of[g] + sums[j + 1].of[g];
 }
 
 // The counts with sector j of the image laid on sector j + shift.
@@ -48,9 +51,13 @@ void count_regions(const Sums* sums, uint32_t sectors, uint32_t shift, uint8_t* 
     const auto end = static_cast<uint32_t>((uint64_t{column + 1} * sectors + columns - 1) / columns);
     const Sums* const low = sums + (begin >= shift ? begin - shift : begin + sectors - shift);
     const Sums* const high = low + (end - begin);
-    coarse[column] = cut(high->inner + high->outer - low->inner - low->outer);
-    fine[2 * size_t{column}] = cut(high->inner - low->inner);
-    fine[2 * size_t{column} + 1] = cut(high->outer - low->outer);
+    uint32_t all = 0;
+    for (uint32_t g = 0; g < kGroups; ++g) {
+      const uint32_t count = high->of[g] - low->of[g];
+      fine[kGroups * column + g] = cut(count);
+      all += count;
+    }
+    coarse[column] = cut(all);
     begin = end;
   }
 }
@@ -104,19 +111,23 @@ size_t revisit_bits_place_bytes(uint32_t rings, uint32_t sectors) {
 
 void revisit_bits_make_place(const uint64_t* image, uint32_t rings, uint32_t sectors, revisit_bits_place* place,
                              uint8_t columns[REVISIT_BITS_COLUMNS]) {
-  uint32_t inner[kColumns] = {}, outer[kColumns] = {};
-  const uint32_t middle = (rings + 1) / 2, used = sectors < kColumns ? sectors : kColumns;
+  uint32_t counts[REVISIT_BITS_REGIONS] = {};
+  const uint32_t used = sectors < kColumns ? sectors : kColumns;
   for (uint32_t j = 0; j < sectors; ++j) {
     const auto column = static_cast<uint32_t>(uint64_t{j} * used / sectors);
-    inner[column] += count_bits(image, j * rings, j * rings + middle);
-    outer[column] += count_bits(image, j * rings + middle, (j + 1) * rings);
+    for (uint32_t g = 0; g < kGroups; ++g)
+      counts[column * kGroups + g] +=
+          count_bits(image, j * rings + first_ring(g, rings), j * rings + first_ring(g + 1, rings));
   }
   std::memset(place, 0, revisit_bits_place_bytes(rings, sectors));
   place->occupied = count_bits(image, 0, rings * sectors);
   for (size_t column = 0; column < kColumns; ++column) {
-    columns[column] = cut(inner[column] + outer[column]);
-    place->fine[2 * column] = cut(inner[column]);
-    place->fine[2 * column + 1] = cut(outer[column]);
+    uint32_t all = 0;
+    for (size_t g = 0; g < kGroups; ++g) {
+      place->fine[column * kGroups + g] = cut(counts[column * kGroups + g]);
+      all += counts[column * kGroups + g];
+    }
+    columns[column] = cut(all);
   }
   std::memcpy(place + 1, image, revisit_bits_words(rings * sectors) * sizeof(uint64_t));
 }

@@ -26,7 +26,8 @@ double match_intensity(const DescriptorView& query, const DescriptorView& candid
   const auto sectors = static_cast<std::size_t>(query.sectors);
   if (sectors > kMostSectors) throw std::invalid_argument("descriptors have up to 720 sectors");
   revisit_bits_sector_products(query.intensity, candidate.intensity, static_cast<std::uint32_t>(query.rings),
-                               static_cast<std::uint32_t>(sectors), static_cast<std::uint32_t>(shift_columns), products);
+                               static_cast<std::uint32_t>(sectors), static_cast<std::uint32_t>(shift_columns),
+                               products);
   double sum = 0.0;
   int counted = 0;
   for (std::size_t j = 0; j < sectors; ++j) {

@@ -73,7 +73,8 @@ Result<PreparedScan> LoopDetector::prepare(Scan scan) {
   return prepared;
 }
 
-Result<Detection> LoopDetector::detect(const PreparedScan& prepared, const std::optional<Pose>& T_world_lidar, Past past) {
+Result<Detection> LoopDetector::detect(const PreparedScan& prepared, const std::optional<Pose>& T_world_lidar,
+                                       Past past) {
   Detection detection;
   detection.frame = prepared.scan.frame;
   detection.points = prepared.scan.points.size();

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_reduce.h>
 #include <Eigen/Cholesky>
 
 namespace revisit {
@@ -23,33 +25,62 @@ Pose small_motion(const Vector6& xi) {  // rotation first, then translation
 
 constexpr double kAllPointsBelow_m = 1.0;
 
-// One Gauss-Newton step at kernel width `width_m`; false where the points do not fix the pose.
-bool step(const SurfaceCloud& target, const SurfaceCloud& source, double width_m, Pose& T, double& moved) {
+// The normal equations of a Gauss-Newton step, summed over points.
+struct Equations {
   Matrix6 H = Matrix6::Zero();
   Vector6 g = Vector6::Zero();
-  const auto reach2 = static_cast<float>(width_m * width_m);
   std::size_t pairs = 0;
-  // While the kernel is wide, some of the points show the way as well as all.
-  const std::size_t stride = width_m > kAllPointsBelow_m ? 4 : 1;
-  for (std::size_t i = 0; i < source.size(); i += stride) {
+
+  void add(const Equations& other) {
+    H += other.H;
+    g += other.g;
+    pairs += other.pairs;
+  }
+};
+
+// Points [begin, end) of the source in steps of `stride`, at kernel width `width_m`.
+Equations equations_of(const SurfaceCloud& target, const SurfaceCloud& source, std::size_t begin, std::size_t end,
+                       std::size_t stride, double width_m, const Pose& T) {
+  Equations sum;
+  const auto reach2 = static_cast<float>(width_m * width_m);
+  const double shrink = width_m * width_m / 4.0;
+  for (std::size_t i = (begin + stride - 1) / stride * stride; i < end; i += stride) {
     const Eigen::Vector3d p = T * source.point(i).cast<double>();
     const auto neighbour = target.nearest(p.cast<float>(), reach2);
-    if (!std::isfinite(neighbour.squared_distance_m2)) continue;
-    const Eigen::Vector3d n = target.normal(neighbour.index).cast<double>();
+    if (!neighbour) continue;
+    const Eigen::Vector3d n = target.normal(neighbour->index).cast<double>();
     if (n.squaredNorm() < 0.5) continue;
-    const double residual = n.dot(p - target.point(neighbour.index).cast<double>());
+    const double residual = n.dot(p - target.point(neighbour->index).cast<double>());
     Vector6 J;
     J << p.cross(n), n;
-    const double shrink = width_m * width_m / 4.0;
-    const double weight = std::pow(shrink / (shrink + residual * residual), 2);
-    H += weight * J * J.transpose();
-    g += weight * residual * J;
-    ++pairs;
+    const double root = shrink / (shrink + residual * residual), weight = root * root;
+    sum.H.noalias() += (weight * J) * J.transpose();
+    sum.g += weight * residual * J;
+    ++sum.pairs;
   }
+  return sum;
+}
+
+// One Gauss-Newton step; false where the points do not fix the pose.
+bool step(const SurfaceCloud& target, const SurfaceCloud& source, double width_m, Pose& T, double& moved) {
+  // While the kernel is wide, some of the points show the way as well as all.
+  const std::size_t stride = width_m > kAllPointsBelow_m ? 4 : 1;
+  // Split and summed in one order, whatever the number of threads.
+  constexpr std::size_t kPointsATask = 1024;
+  Equations sum = tbb::parallel_deterministic_reduce(
+      tbb::blocked_range<std::size_t>(0, source.size(), kPointsATask * stride), Equations{},
+      [&](const tbb::blocked_range<std::size_t>& range, Equations part) {
+        part.add(equations_of(target, source, range.begin(), range.end(), stride, width_m, T));
+        return part;
+      },
+      [](Equations a, const Equations& b) {
+        a.add(b);
+        return a;
+      });
   constexpr std::size_t kFewestPairs = 20;
-  if (pairs < kFewestPairs) return false;
-  H.diagonal().array() += 1e-6 * H.diagonal().maxCoeff();  // a direction that nothing sees stays where it was
-  const Vector6 xi = H.ldlt().solve(-g);
+  if (sum.pairs < kFewestPairs) return false;
+  sum.H.diagonal().array() += 1e-6 * sum.H.diagonal().maxCoeff();  // a direction that nothing sees stays where it was
+  const Vector6 xi = sum.H.ldlt().solve(-sum.g);
   if (!xi.allFinite()) return false;
   T = small_motion(xi) * T;
   moved = xi.head<3>().norm() * 20.0 + xi.tail<3>().norm();  // metres, of a point 20 m away
@@ -73,9 +104,9 @@ DirectionalAgreement agreement_one_way(const SurfaceCloud& to, const SurfaceClou
     if (p.norm() > farthest_m) continue;
     ++result.visible;
     const auto neighbour = to.nearest(p.cast<float>(), reach2);
-    if (!std::isfinite(neighbour.squared_distance_m2)) continue;
-    const Eigen::Vector3d n = to.normal(neighbour.index).cast<double>();
-    const Eigen::Vector3d d = p - to.point(neighbour.index).cast<double>();
+    if (!neighbour) continue;
+    const Eigen::Vector3d n = to.normal(neighbour->index).cast<double>();
+    const Eigen::Vector3d d = p - to.point(neighbour->index).cast<double>();
     const double distance = n.squaredNorm() < 0.5 ? d.norm() : std::abs(n.dot(d));
     if (distance > inlier_distance_m) continue;
     ++result.inliers;

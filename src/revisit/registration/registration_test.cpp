@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <random>
+
 #include <gtest/gtest.h>
 
 #include <pcl/point_types.h>
@@ -45,7 +48,35 @@ TEST(SurfaceCloud, NormalsOfAPlane) {
   const SurfaceCloud cloud(plane);
   const Eigen::Vector3f expected = Eigen::Vector3f(-0.5f, 0.f, 1.f).normalized();
   for (std::size_t i = 0; i < cloud.size(); ++i) EXPECT_NEAR(std::abs(cloud.normal(i).dot(expected)), 1.f, 1e-3f);
-  EXPECT_EQ(cloud.nearest(Eigen::Vector3f(3.2f, 4.1f, 1.5f)).index, 3u * 20u + 4u);
+  ASSERT_TRUE(cloud.nearest(Eigen::Vector3f(3.2f, 4.1f, 1.5f)));
+  EXPECT_EQ(cloud.nearest(Eigen::Vector3f(3.2f, 4.1f, 1.5f))->index, 3u * 20u + 4u);
+  EXPECT_FALSE(cloud.nearest(Eigen::Vector3f(3.2f, 4.1f, 9.5f), 4.f)) << "none within 2 m";
+}
+
+TEST(SurfaceCloud, NearestIsThatOfTryingAllWhateverTheReach) {
+  std::mt19937 random(4);
+  ThinCloud cloud;
+  for (int i = 0; i < 500; ++i) {
+    const auto within = [&](float metres) { return std::uniform_real_distribution<float>(-metres, metres)(random); };
+    cloud.points.emplace_back(within(30.f), within(10.f), i % 7 == 0 ? within(100.f) : within(3.f));
+  }
+  cloud.points.emplace_back(5000.f, 0.f, 0.f);  // beyond the grid's edge
+  for (const float voxel_m : {0.3f, 1.f, 5.f}) {
+    cloud.voxel_m = voxel_m;
+    const SurfaceCloud surface(cloud);
+    for (const float reach_m : {0.5f, 2.f, 7.3f, std::numeric_limits<float>::infinity()})
+      for (std::size_t q = 0; q < 500; q += 3) {
+        const Eigen::Vector3f query = cloud.points[q] * 1.3f + Eigen::Vector3f(0.2f, -0.4f, 0.1f);
+        float least = reach_m * reach_m;
+        for (const auto& p : cloud.points) least = std::min(least, (p - query).squaredNorm());
+        const auto found = surface.nearest(query, reach_m * reach_m);
+        ASSERT_EQ(found.has_value(), least < reach_m * reach_m) << query.transpose() << ", " << reach_m << " m";
+        if (found) {
+          ASSERT_FLOAT_EQ(found->squared_distance_m2, least);
+          ASSERT_FLOAT_EQ((cloud.points[found->index] - query).squaredNorm(), least);
+        }
+      }
+  }
 }
 
 TEST(Icp, FindsAKnownMotionFromMetresAway) {

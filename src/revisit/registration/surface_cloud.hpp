@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -18,12 +19,15 @@ struct ThinCloud {
   std::vector<Eigen::Vector3f> points;  ///< centroids of the voxels, metres, LiDAR frame; in an order that depends on
                                         ///< the points alone
   std::vector<std::uint8_t> is_ground;  ///< one a point: most of its voxel lay on the ground
+  float voxel_m = 1.f;
 };
 
-/// Thins `points` with cubic voxels of `voxel_m`. `is_ground` has one entry a point or is empty (nothing is ground).
+/// Thins `points`, which are finite, with cubic voxels of `voxel_m`; points more than 1,024 voxels out are taken
+/// together. `is_ground` has one entry a point or is empty (nothing is ground). Throws std::invalid_argument for no
+/// voxel size.
 ThinCloud thin(std::span<const Point> points, std::span<const std::uint8_t> is_ground, double voxel_m);
 
-/// A thin cloud with what registration needs of it: normals and a search tree. Safe to share between threads.
+/// A thin cloud with what registration needs of it: normals and neighbours. Safe to share between threads.
 class SurfaceCloud {
  public:
   explicit SurfaceCloud(ThinCloud cloud);
@@ -37,21 +41,19 @@ class SurfaceCloud {
   const Eigen::Vector3f& normal(std::size_t i) const { return normals_[i]; }
   bool is_ground(std::size_t i) const { return cloud_.is_ground[i] != 0; }
 
-  /// The nearest point and its squared distance, which is infinite where no point is nearer than the reach.
   struct Neighbour {
     std::size_t index = 0;
     float squared_distance_m2 = 0.f;
   };
-  Neighbour nearest(const Eigen::Vector3f& query,
-                    float squared_reach_m2 = std::numeric_limits<float>::infinity()) const;
-  /// Up to `k` nearest points, nearest first.
-  std::vector<Neighbour> nearest(const Eigen::Vector3f& query, std::size_t k) const;
+  /// The nearest point; none where no point is nearer than the reach.
+  std::optional<Neighbour> nearest(const Eigen::Vector3f& query,
+                                   float squared_reach_m2 = std::numeric_limits<float>::infinity()) const;
 
  private:
-  struct Tree;
+  struct Grid;
   ThinCloud cloud_;
   std::vector<Eigen::Vector3f> normals_;
-  std::unique_ptr<Tree> tree_;
+  std::unique_ptr<Grid> grid_;
 };
 
 }  // namespace revisit

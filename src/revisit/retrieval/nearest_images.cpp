@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::size_t kBlock = REVISIT_BITS_BLOCK;
 
+constexpr std::uint32_t kStep = 8;
 constexpr std::size_t kIntact = SIZE_MAX;
 // Fewer places than this for each thread are not worth waking it up.
 constexpr std::size_t kPlacesPerThread = 8192;
@@ -24,7 +25,7 @@ struct Query {
   const PlaceStore& store;
   const revisit_bits_query& prepared;
   std::size_t wanted;
-  std::atomic<std::uint32_t> limit;             ///< some thread knows enough places that are nearer
+  std::atomic<std::uint32_t> limit;            ///< some thread knows enough places that are nearer
   std::atomic<std::size_t> damaged = kIntact;  ///< a place whose image was refused
 };
 
@@ -52,8 +53,8 @@ class Part {
     find_bounds();
     const std::uint32_t near = promising_half_bound();
     limit_by_promising_turns(near);
-    compare(0, near);
-    if (near < 255) compare(near + 1, 255);
+    for (std::uint32_t low = 0, high = near; low <= 255; low = high + 1, high = std::min(low + kStep - 1, 255u))
+      if (!compare(low, high)) break;
     return compared_;
   }
 
@@ -71,11 +72,14 @@ class Part {
     }
   }
 
+  // The more places there are, the more are worth a look beforehand.
+  std::size_t promising_blocks() const { return std::min(blocks_, query_.wanted + 8 + blocks_ / 64); }
+
   // So many blocks have a half bound up to this that the places wanted are likely among theirs.
   std::uint32_t promising_half_bound() const {
     std::array<std::uint32_t, 256> histogram{};
     for (std::size_t block = 0; block < blocks_; ++block) ++histogram[scratch_->least[block]];
-    const std::size_t promising = std::min(blocks_, query_.wanted + 8);
+    const std::size_t promising = promising_blocks();
     std::uint32_t near = 0;
     for (std::size_t sum = 0; near < 255 && (sum += histogram[near]) < promising;) ++near;
     return near;
@@ -89,9 +93,8 @@ class Part {
       const std::uint32_t limit = query_.limit.load(std::memory_order_relaxed);
       const std::uint32_t below = std::min(high + 1, limit / 2 + limit % 2);
       if (scratch_->least[block] >= below || below <= low) continue;
-      std::uint64_t which =
-          revisit_bits_between(scratch_->half_bounds.data() + block * kBlock, static_cast<std::uint8_t>(low),
-                               static_cast<std::uint8_t>(below - 1));
+      std::uint64_t which = revisit_bits_between(scratch_->half_bounds.data() + block * kBlock,
+                                                 static_cast<std::uint8_t>(low), static_cast<std::uint8_t>(below - 1));
       const std::size_t here = end_ - begin_ - block * kBlock;
       if (here < kBlock) which &= (std::uint64_t{1} << here) - 1;
       if (which != 0) visit(begin_ + block * kBlock, which);
@@ -103,8 +106,9 @@ class Part {
     std::vector<std::uint32_t>& upper = scratch_->upper_bounds;
     upper.clear();
     for_each_block(0, near, [&](std::size_t first, std::uint64_t which) {
-      for (; which != 0 && upper.size() < 2 * query_.wanted + 16; which &= which - 1) {
-        const revisit_bits_place* const place = query_.store.place(first + static_cast<std::size_t>(std::countr_zero(which)));
+      for (; which != 0 && upper.size() < 2 * promising_blocks(); which &= which - 1) {
+        const revisit_bits_place* const place =
+            query_.store.place(first + static_cast<std::size_t>(std::countr_zero(which)));
         if (place != nullptr) upper.push_back(revisit_bits_hamming_at_promising_turn(&query_.prepared, place));
       }
     });
@@ -114,7 +118,8 @@ class Part {
     lower(query_.limit, *last + 1);
   }
 
-  void compare(std::uint32_t low, std::uint32_t high) {
+  bool compare(std::uint32_t low, std::uint32_t high) {
+    if (2 * low >= query_.limit.load(std::memory_order_relaxed)) return false;
     for_each_block(low, high, [&](std::size_t first, std::uint64_t which) {
       const revisit_bits_place* const places = query_.store.place(first);
       if (places == nullptr) {
@@ -130,6 +135,7 @@ class Part {
         keep({distances[i], shifts[i], first + i});
       }
     });
+    return true;
   }
 
   // The heap holds the best so far, the worst of them on top.
@@ -166,7 +172,8 @@ Result<std::vector<NearImage>> nearest_images(const PlaceStore& store, std::size
   revisit_bits_prepare(query, rings, sectors, memory.data(), &prepared);
   Query shared{store, prepared, std::min(count, places), farthest == UINT32_MAX ? farthest : farthest + 1};
 
-  const std::size_t parts = std::clamp<std::size_t>(places / kPlacesPerThread, 1, static_cast<std::size_t>(std::max(1, threads)));
+  const std::size_t parts =
+      std::clamp<std::size_t>(places / kPlacesPerThread, 1, static_cast<std::size_t>(std::max(1, threads)));
   std::size_t compared = 0;
   if (parts == 1) {
     compared = Part(shared, 0, places, result).search();

@@ -74,9 +74,9 @@ std::vector<NearImage> compare_all(const PlaceStore& store, const IntensityScanC
   std::vector<NearImage> all(store.size());
   for (std::size_t i = 0; i < all.size(); ++i) {
     all[i].place = i;
-    all[i].distance =
-        revisit_bits_min_hamming(query.occupancy.data(), PlaceStore::image_of(store.place(i)), static_cast<std::uint32_t>(query.rings),
-                                 static_cast<std::uint32_t>(query.sectors), &all[i].shift);
+    all[i].distance = revisit_bits_min_hamming(query.occupancy.data(), PlaceStore::image_of(store.place(i)),
+                                               static_cast<std::uint32_t>(query.rings),
+                                               static_cast<std::uint32_t>(query.sectors), &all[i].shift);
   }
   return all;
 }

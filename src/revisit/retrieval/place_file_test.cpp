@@ -28,8 +28,7 @@ class PlaceFile : public testing::Test {
 
   static PlaceIndex filled(int places) {
     PlaceIndex index{options()};
-    for (int i = 0; i < places; ++i)
-      index.add(FrameId{3 * i}, 0.1 * i, random_context(static_cast<unsigned>(i % 700)));
+    for (int i = 0; i < places; ++i) index.add(FrameId{3 * i}, 0.1 * i, random_context(static_cast<unsigned>(i % 700)));
     return index;
   }
   static RetrievalOptions options() {
@@ -56,8 +55,8 @@ class PlaceFile : public testing::Test {
   }
 
   const fs::path folder =
-      fs::temp_directory_path() / ("revisit_" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()) + "_" +
-                                   ::testing::UnitTest::GetInstance()->current_test_info()->name());
+      fs::temp_directory_path() / ("revisit_" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()) +
+                                   "_" + ::testing::UnitTest::GetInstance()->current_test_info()->name());
   const fs::path path = folder / "map.places";
 };
 

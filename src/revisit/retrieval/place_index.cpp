@@ -63,24 +63,24 @@ std::size_t PlaceIndex::old_enough(FrameId frame, double stamp_s) const {
 bool PlaceIndex::has_searchable_past(FrameId frame, double stamp_s) const { return old_enough(frame, stamp_s) > 0; }
 
 Result<std::vector<LoopCandidate>> PlaceIndex::search(FrameId frame, double stamp_s, const IntensityScanContext& query,
-                                              int threads, SearchEffort* effort) const {
+                                                      int threads, SearchEffort* effort) const {
   return rank(old_enough(frame, stamp_s), query, threads, effort);
 }
 
 Result<std::vector<LoopCandidate>> PlaceIndex::search_all(const IntensityScanContext& query, int threads,
-                                                  SearchEffort* effort) const {
+                                                          SearchEffort* effort) const {
   return rank(store_->size(), query, threads, effort);
 }
 
 Result<std::vector<LoopCandidate>> PlaceIndex::rank(std::size_t places, const IntensityScanContext& query, int threads,
-                                            SearchEffort* effort) const {
+                                                    SearchEffort* effort) const {
   if (places > 0 && (query.rings != store_->rings() || query.sectors != store_->sectors()))
     throw std::invalid_argument("descriptors of different grids cannot be compared");
   const auto shortlist = options_.shortlist == 0 ? places : static_cast<std::size_t>(options_.shortlist);
   retrieval_internal::SearchCounts counts;
   const auto nearest = retrieval_internal::nearest_images(*store_, places, query.occupancy.data(), shortlist,
-                                                       farthest_distance(options_.min_geometry_score, query.cells()),
-                                                       threads, &counts);
+                                                          farthest_distance(options_.min_geometry_score, query.cells()),
+                                                          threads, &counts);
   if (!nearest) return nearest.error();
   if (effort != nullptr) *effort = {counts.places, counts.compared};
 

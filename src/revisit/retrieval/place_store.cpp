@@ -51,8 +51,8 @@ void PlaceStore::add(FrameId frame, double stamp_s, const IntensityScanContext& 
     sectors_ = descriptor.sectors;
     layout_ = {rings_, sectors_};
   }
-  Chunk& chunk = i % kChunk == 0 ? append_chunk(i / kChunk, nullptr)
-                                 : *chunks_[i / kChunk].load(std::memory_order_relaxed);
+  Chunk& chunk =
+      i % kChunk == 0 ? append_chunk(i / kChunk, nullptr) : *chunks_[i / kChunk].load(std::memory_order_relaxed);
   const double latest = i > 0 ? std::max(stamp_s, latest_s(i - 1)) : stamp_s;
   const std::size_t at = i % kChunk;
   std::uint8_t* const data = chunk.owned.data();
