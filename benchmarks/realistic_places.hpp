@@ -84,8 +84,10 @@ class RealisticPlaces {
       if (!view) throw std::runtime_error(store.damage(i).message);
       result[i] = {view->rings,
                    view->sectors,
+                   view->levels,
                    {view->intensity, view->intensity + view->cells()},
-                   {view->occupancy, view->occupancy + revisit_bits_words(static_cast<std::uint32_t>(view->cells()))}};
+                   {view->occupancy,
+                    view->occupancy + revisit_bits_words(static_cast<std::uint32_t>(view->rows() * view->sectors))}};
     }
     return result;
   }

@@ -45,6 +45,8 @@ Grid& grid(int rings) {
     DescriptorOptions options;
     options.rings = rings;
     options.sectors = 1200 / rings;
+    options.levels = 0;
+    options.max_range_m = 50.0;
     found = std::make_unique<Grid>(options);
   }
   return *found;

@@ -34,8 +34,8 @@ int main(int argc, char** argv) {
   const auto candidates = *index.search_all(descriptors[1]);
   std::printf("geometry %.3f, intensity %.3f, yaw %.0f degrees\n", candidates[0].geometry_score,
               candidates[0].intensity_score, revisit::to_degrees(candidates[0].yaw_rad));
-  const auto evidence =
-      revisit::check_geometric(geometries[0], geometries[1], candidates[0].yaw_rad, parameters.geometric);
+  const auto evidence = revisit::check_geometric(
+      geometries[0], geometries[1], revisit::planar_pose(0, 0, candidates[0].yaw_rad), parameters.geometric);
   std::printf("inlier ratio %.2f, rmse %.3f m: %s\n", evidence.inlier_ratio, evidence.rmse_m,
               evidence.consistent ? "the same place" : evidence.reason.c_str());
 }

@@ -15,7 +15,7 @@ ALLOWED = {
     "config": {"core"},
     "io": CORE_CONFIG,
     "preprocess": CORE_CONFIG,
-    "registration": CORE_CONFIG,
+    "registration": CORE_CONFIG | {"bits"},
     "pose_graph": CORE_CONFIG,
     "mapping": CORE_CONFIG,
     "evaluation": CORE_CONFIG,

@@ -88,6 +88,7 @@ void expect_equal(const std::vector<Point>& query, const std::vector<Point>& can
   DescriptorOptions options;
   options.rings = Nr;
   options.sectors = Ns;
+  options.levels = 0;
   options.max_range_m = Lmax;
   const IntensityScanContext fast_q = describe(query, options), fast_c = describe(candidate, options);
   const PageDescriptor q = describe_by_the_page(query, Nr, Ns, Lmax), c = describe_by_the_page(candidate, Nr, Ns, Lmax);

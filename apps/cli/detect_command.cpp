@@ -24,7 +24,7 @@ struct Options {
 };
 
 void count(RunFile& run, const Detection& detection) {
-  run.counts["queries_with_past"] += detection.had_searchable_past;
+  run.counts["queries_with_past"] += detection.newest_searchable.has_value();
   run.counts["loops"] += detection.loop.has_value();
   run.counts["registered"] += detection.geometric.has_value();
   run.counts["points"] += detection.points;
@@ -49,7 +49,7 @@ void skip(RunFile& run, Progress& progress, const Error& error) {
 }
 
 Status write_loop(ResultWriter& writer, const Detection& detection) {
-  if (detection.had_searchable_past)
+  if (detection.newest_searchable)
     if (const Status status = writer.add(detection.row()); !status) return status;
   return detection.loop ? writer.add(LoopRow{*detection.loop, detection.score}) : ok();
 }

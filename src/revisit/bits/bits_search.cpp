@@ -228,6 +228,18 @@ uint64_t Compare(const revisit_bits_query* query, const revisit_bits_place* plac
   return below;
 }
 
+uint64_t Common(const uint64_t* HWY_RESTRICT a, const uint64_t* HWY_RESTRICT b, size_t words) {
+  const hn::CappedTag<uint64_t, 8> d;
+  const size_t width = hn::Lanes(d);
+  auto sum = hn::Zero(d);
+  size_t w = 0;
+  for (; w + width <= words; w += width)
+    sum = hn::Add(sum, hn::PopulationCount(hn::And(hn::LoadU(d, a + w), hn::LoadU(d, b + w))));
+  uint64_t count = hn::GetLane(hn::SumOfLanes(d, sum));
+  for (; w < words; ++w) count += static_cast<uint64_t>(std::popcount(a[w] & b[w]));
+  return count;
+}
+
 // Sums of squares and products of bytes, in 32 bits.
 void SectorProducts(const uint8_t* query, const uint8_t* candidate, uint32_t rings, uint32_t sectors, uint32_t shift,
                     uint32_t* sums) {
@@ -276,6 +288,7 @@ HWY_EXPORT(HalfBounds);
 HWY_EXPORT(Between);
 HWY_EXPORT(HammingAtPromisingTurn);
 HWY_EXPORT(Compare);
+HWY_EXPORT(Common);
 HWY_EXPORT(SectorProducts);
 
 }  // namespace revisit::bits_internal
@@ -299,6 +312,10 @@ uint64_t revisit_bits_compare(const revisit_bits_query* query, const revisit_bit
                               uint64_t which, uint32_t limit, uint32_t distances[REVISIT_BITS_BLOCK],
                               uint32_t shifts[REVISIT_BITS_BLOCK]) {
   return HWY_DYNAMIC_DISPATCH(Compare)(query, places, place_bytes, which, limit, distances, shifts);
+}
+
+uint64_t revisit_bits_common(const uint64_t* a, const uint64_t* b, size_t words) {
+  return HWY_DYNAMIC_DISPATCH(Common)(a, b, words);
 }
 
 void revisit_bits_sector_products(const uint8_t* query, const uint8_t* candidate, uint32_t rings, uint32_t sectors,

@@ -67,6 +67,9 @@ uint64_t revisit_bits_compare(const revisit_bits_query* query, const revisit_bit
                               uint64_t which, uint32_t limit, uint32_t distances[REVISIT_BITS_BLOCK],
                               uint32_t shifts[REVISIT_BITS_BLOCK]);
 
+/* How many bits are set in both. */
+uint64_t revisit_bits_common(const uint64_t* a, const uint64_t* b, size_t words);
+
 /* For two polar images of one byte a cell, the query turned by `shift` sectors: for each sector of the query the sums
  * over its rings of q * q, c * c and q * c. `sums` has room for 3 * sectors; rings <= 66,000 cannot overflow. */
 void revisit_bits_sector_products(const uint8_t* query, const uint8_t* candidate, uint32_t rings, uint32_t sectors,

@@ -248,6 +248,20 @@ TEST_F(EveryInstructionSet, BytesBetweenAreThoseOfTheDefinition) {
   }
 }
 
+TEST_F(EveryInstructionSet, CommonBitsAreThoseOfTheDefinition) {
+  std::mt19937_64 generator(9);
+  for (const size_t words : {size_t{0}, size_t{1}, size_t{7}, size_t{8}, size_t{255}}) {
+    std::vector<uint64_t> a(words), b(words);
+    for (size_t w = 0; w < words; ++w) a[w] = generator(), b[w] = generator();
+    uint64_t expected = 0;
+    for (size_t bit = 0; bit < 64 * words; ++bit) expected += (a[bit / 64] & b[bit / 64]) >> (bit % 64) & 1;
+    for (const int64_t target : supported_instruction_sets()) {
+      force_instruction_set(target);
+      EXPECT_EQ(revisit_bits_common(a.data(), b.data(), words), expected) << revisit::instruction_set_name();
+    }
+  }
+}
+
 // Counts of the fine regions decide which turns are compared: they must be those of the definition on both sides.
 TEST(OccupancyBits, CountsOfRegionsAreThoseOfTheDefinition) {
   std::mt19937 generator(6);

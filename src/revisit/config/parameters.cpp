@@ -49,9 +49,17 @@ const std::vector<Entry>& table() {
                    "share of the readings at or below full scale, where it is found from the recording"),
       REVISIT_INTEGER(descriptor, rings, 1, 512, "N_r, radial bins of the polar grid"),
       REVISIT_INTEGER(descriptor, sectors, 1, 720, "N_s, azimuthal bins of the polar grid"),
+      REVISIT_INTEGER(
+          descriptor, levels, 0, 8,
+          "layers of the binary image, each of what stands higher above the ground; 0 makes one of all points"),
+      REVISIT_REAL(descriptor, lowest_level_m, -10, 50, "height above the ground of the lowest layer"),
+      REVISIT_REAL(descriptor, level_step_m, 0.1, 50, "height from layer to layer"),
       REVISIT_REAL(descriptor, max_range_m, 1, 500, "L_max, outer radius of the polar grid"),
       REVISIT_INTEGER(descriptor, min_occupied_cells, 1, 100000, "a scan with fewer occupied cells describes no place"),
       REVISIT_INTEGER(retrieval, top_k, 1, 1000, "candidates returned for a query, best first"),
+      REVISIT_INTEGER(retrieval, separation_frames, 0, 100000,
+                      "of candidates so few frames apart only the best is returned"),
+      REVISIT_REAL(retrieval, intensity_weight, 0, 1, "weight of the intensity score beside the geometry score"),
       REVISIT_INTEGER(retrieval, shortlist, 0, 10000000,
                       "places of best geometry score that enter the intensity stage; 0 lets all in"),
       REVISIT_REAL(retrieval, min_geometry_score, 0, 1, "epsilon_g, least geometry score of a candidate"),
@@ -64,6 +72,10 @@ const std::vector<Entry>& table() {
       REVISIT_INTEGER(geometric, candidates, 1, 1000, "how many of the top-K candidates are registered, best first"),
       REVISIT_REAL(geometric, min_descriptor_score, 0, 2,
                    "candidates of lower geometry plus intensity score are not registered"),
+      REVISIT_SWITCH(geometric, overhead_search,
+                     "find position and heading by laying the scans on each other from overhead before registering"),
+      REVISIT_REAL(geometric, min_overlap, 0, 1,
+                   "least overlap from overhead, the smaller of both directions, that is worth registering"),
       REVISIT_SWITCH(geometric, features_first, "register from FPFH features before trying the yaw of the descriptors"),
       REVISIT_SWITCH(
           geometric, features_fallback,
@@ -72,6 +84,10 @@ const std::vector<Entry>& table() {
       REVISIT_REAL(geometric, inlier_distance_m, 0.01, 5, "farthest point-to-plane distance of an inlier"),
       REVISIT_REAL(geometric, min_inlier_ratio, 0, 1,
                    "share of the points above ground, in both directions, that must be inliers"),
+      REVISIT_REAL(
+          geometric, min_free_space_agreement, 0, 1,
+          "least share, in both directions, of points that fit among these and the points that stand where the "
+          "other scan saw through"),
       REVISIT_REAL(geometric, max_translation_m, 0.1, 1000, "a longer relative translation is refused"),
       REVISIT_TEXT(simulation, world, "what is driven through: town or warehouse"),
       REVISIT_TEXT(simulation, sensor, "what looks about: hdl64e, vlp16, os0-128 or rosette"),
@@ -165,6 +181,8 @@ Result<Parameters> preset(std::string_view name) {
   if (name == "grid20x60") {
     p.descriptor.rings = 20;
     p.descriptor.sectors = 60;
+    p.descriptor.levels = 0;
+    p.descriptor.max_range_m = 50.0;
     return p;
   }
   if (name == "paper") {  // table I of the paper, to the letter
@@ -172,12 +190,19 @@ Result<Parameters> preset(std::string_view name) {
     p.preprocess.remove_ground = true;
     p.descriptor.sectors = 20;
     p.descriptor.rings = 60;
+    p.descriptor.levels = 0;
+    p.retrieval.top_k = 5;
+    p.retrieval.separation_frames = 0;
+    p.retrieval.intensity_weight = 1.0;
     p.retrieval.shortlist = 0;
     p.retrieval.min_geometry_score = 0.9;
     p.retrieval.min_intensity_score = 0.92;
     p.temporal.frames = 5;
     p.temporal.min_score = 1.8;
     p.geometric.min_descriptor_score = 0.0;
+    p.geometric.min_inlier_ratio = 0.6;
+    p.geometric.min_free_space_agreement = 0.0;
+    p.geometric.overhead_search = false;
     p.geometric.features_first = true;
     return p;
   }

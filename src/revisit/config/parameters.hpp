@@ -26,15 +26,20 @@ struct IntensityOptions {
 
 /// The polar grid of intensity scan context (paper, section III-B).
 struct DescriptorOptions {
-  int rings = 60;               ///< N_r, radial bins
-  int sectors = 20;             ///< N_s, azimuthal bins
-  double max_range_m = 50.0;    ///< L_max
+  int rings = 20;               ///< N_r, radial bins
+  int sectors = 30;             ///< N_s, azimuthal bins
+  int levels = 4;               ///< layers of the image, by height above the ground; 0: one, of all points
+  double lowest_level_m = 0.5;  ///< of the first layer, above the ground
+  double level_step_m = 2.0;    ///< from layer to layer
+  double max_range_m = 80.0;    ///< L_max
   int min_occupied_cells = 12;  ///< fewer occupied cells describe no place
 };
 
 /// The two search stages (paper, section III-C) and who may be matched (docs/evaluation.md).
 struct RetrievalOptions {
-  int top_k = 5;                     ///< candidates returned, best first
+  int top_k = 20;                    ///< candidates returned, best first
+  int separation_frames = 8;         ///< of places so few frames apart, one is returned
+  double intensity_weight = 0.1;     ///< of Phi_i beside Phi_g in the order of candidates; 1 in the paper
   int shortlist = 200;               ///< places of best geometry score that enter the intensity stage; 0 = all
   double min_geometry_score = 0.0;   ///< epsilon_g
   double min_intensity_score = 0.0;  ///< epsilon_i
@@ -50,15 +55,18 @@ struct TemporalOptions {
 
 /// Geometric consistency: FPFH, then ICP (paper, section III-D).
 struct GeometricOptions {
-  double voxel_m = 1.0;               ///< edge of the voxels that thin a scan
-  int candidates = 3;                 ///< how many of the top-K are registered, best first
-  double min_descriptor_score = 1.0;  ///< candidates with a lower Phi_g + Phi_i are not registered
-  bool features_first = false;        ///< start from FPFH, as the paper does, before trying the descriptors' yaw
-  bool features_fallback = false;     ///< try FPFH where the descriptors' yaw gave no accepted registration; slow
-  double feature_radius_m = 3.0;      ///< neighbourhood of FPFH features
-  double inlier_distance_m = 0.4;     ///< farthest point-to-plane distance of an inlier
-  double min_inlier_ratio = 0.6;      ///< share of the points above ground, both ways, that must be inliers
-  double max_translation_m = 15.0;    ///< a longer relative translation is refused
+  double voxel_m = 1.0;                    ///< edge of the voxels that thin a scan
+  int candidates = 3;                      ///< how many of the top-K are registered, best first
+  double min_descriptor_score = 0.0;       ///< candidates with a lower Phi_g + Phi_i are not registered
+  bool overhead_search = true;             ///< find position and heading from overhead before registering
+  double min_overlap = 0.4;                ///< of both images from overhead; candidates below are not registered
+  bool features_first = false;             ///< start from FPFH, as the paper does, before trying the descriptors' yaw
+  bool features_fallback = false;          ///< try FPFH where the descriptors' yaw gave no accepted registration; slow
+  double feature_radius_m = 3.0;           ///< neighbourhood of FPFH features
+  double inlier_distance_m = 0.4;          ///< farthest point-to-plane distance of an inlier
+  double min_inlier_ratio = 0.4;           ///< share of the points above ground, both ways, that must be inliers
+  double min_free_space_agreement = 0.85;  ///< inliers among these and points where the other scan saw through
+  double max_translation_m = 15.0;         ///< a longer relative translation is refused
 };
 
 /// A drive that is simulated instead of read (docs/simulation.md).

@@ -31,6 +31,14 @@ inline double rotation_angle(const Pose& T) { return Eigen::AngleAxisd(T.rotatio
 /// Heading of the x axis seen from above, radians.
 inline double yaw_of(const Pose& T) { return std::atan2(T.linear()(1, 0), T.linear()(0, 0)); }
 
+/// At (x, y), turned about the vertical: the pose that has this heading.
+inline Pose planar_pose(double x_m, double y_m, double yaw_rad) {
+  Pose T = Pose::Identity();
+  T.linear() = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  T.translation() << x_m, y_m, 0.0;
+  return T;
+}
+
 /// Poses of the LiDAR at scan time, by frame; a frame without an entry has no known pose.
 struct Trajectory {
   struct Entry {

@@ -25,33 +25,46 @@ std::uint8_t quantise_intensity(float intensity) {
 }
 
 Describer::Describer(const DescriptorOptions& options) : options_(options) {
-  if (options.rings < 1 || options.rings > 512 || options.sectors < 1 || options.sectors > 720 ||
-      !(options.max_range_m > 0.0))
+  if (options.rings < 1 || options.rings > 512 || options.sectors < 1 || options.sectors > 720 || options.levels < 0 ||
+      options.levels > 8 || !(options.max_range_m > 0.0) || !(options.level_step_m > 0.0))
     throw std::invalid_argument("descriptor grid " + std::to_string(options.rings) + " x " +
-                                std::to_string(options.sectors) + ", " + std::to_string(options.max_range_m) +
-                                " m; allowed: 1 to 512 rings, 1 to 720 sectors, more than 0 m");
+                                std::to_string(options.sectors) + " x " + std::to_string(options.levels) + ", " +
+                                std::to_string(options.max_range_m) + " m, levels of " +
+                                std::to_string(options.level_step_m) +
+                                " m; allowed: 1 to 512 rings, 1 to 720 sectors, 0 to 8 levels, more than 0 m");
   cells_.resize(static_cast<std::size_t>(options.rings) * static_cast<std::size_t>(options.sectors) + 1);
+  tops_.resize(cells_.size());
 }
 
-void Describer::describe(std::span<const Point> points, IntensityScanContext& result) {
+void Describer::describe(std::span<const Point> points, IntensityScanContext& result, double ground_z_m) {
   std::fill(cells_.begin(), cells_.end(), std::uint16_t{0});
+  std::fill(tops_.begin(), tops_.end(), std::uint8_t{0});
   descriptors_internal::bin_points(points.data(), points.size(),
-                                   {options_.rings, options_.sectors, options_.max_range_m}, cells_.data());
+                                   {options_.rings, options_.sectors, options_.max_range_m},
+                                   {static_cast<float>(ground_z_m + options_.lowest_level_m),
+                                    static_cast<float>(1.0 / options_.level_step_m), options_.levels},
+                                   cells_.data(), tops_.data());
   result.rings = options_.rings;
   result.sectors = options_.sectors;
+  result.levels = options_.levels;
   const std::size_t cells = cells_.size() - 1;
   result.intensity.resize(cells);
-  result.occupancy.assign(revisit_bits_words(static_cast<std::uint32_t>(cells)), 0);
+  const auto rings = static_cast<std::size_t>(options_.rings), layers = rings == 0 ? 0 : result.rows() / rings;
+  result.occupancy.assign(revisit_bits_words(static_cast<std::uint32_t>(cells * layers)), 0);
   for (std::size_t i = 0; i < cells; ++i) {
     const std::uint16_t cell = cells_[i];
     result.intensity[i] = static_cast<std::uint8_t>(cell - (cell != 0));
-    result.occupancy[i / 64] |= std::uint64_t{cell != 0} << (i % 64);
+    const std::size_t top = options_.levels == 0 ? cell != 0 : tops_[i];
+    for (std::size_t layer = 0; layer < top; ++layer) {
+      const std::size_t bit = i / rings * rings * layers + layer * rings + i % rings;
+      result.occupancy[bit / 64] |= std::uint64_t{1} << (bit % 64);
+    }
   }
 }
 
-IntensityScanContext describe(std::span<const Point> points, const DescriptorOptions& options) {
+IntensityScanContext describe(std::span<const Point> points, const DescriptorOptions& options, double ground_z_m) {
   IntensityScanContext result;
-  Describer(options).describe(points, result);
+  Describer(options).describe(points, result, ground_z_m);
   return result;
 }
 

@@ -17,6 +17,7 @@ TEST(Describe, ACellIsWhatItsPointsMakeIt) {
   DescriptorOptions options;
   options.rings = 10;
   options.sectors = 4;
+  options.levels = 0;
   options.max_range_m = 50.0;
   // Sector 2 is theta in [0, pi/2), ring 1 is rho in [5, 10).
   const std::vector<Point> points = {
@@ -29,9 +30,35 @@ TEST(Describe, ACellIsWhatItsPointsMakeIt) {
   EXPECT_EQ(context.intensity[0 * 10 + 6], 0);
 }
 
+TEST(Describe, LayersHoldWhatStandsHigher) {
+  DescriptorOptions options;
+  options.rings = 10;
+  options.sectors = 4;
+  options.levels = 3;
+  options.lowest_level_m = 0.5;
+  options.level_step_m = 2.0;
+  options.max_range_m = 50.0;
+  const double ground_z_m = -2.0;  // layers above -1.5, 0.5 and 2.5
+  const std::vector<Point> points = {{6.f, 1.f, -1.9f, 0.9f},
+                                     {12.f, 1.f, -1.5f, 0.f},
+                                     {17.f, 1.f, 0.6f, 0.f},
+                                     {22.f, 1.f, 50.f, 0.f},
+                                     {22.f, 2.f, -1.f, 0.f}};
+  const IntensityScanContext context = describe(points, options, ground_z_m);
+  const auto layers = [&](int ring) {
+    return std::vector<bool>{context.occupied(ring, 2, 0), context.occupied(ring, 2, 1), context.occupied(ring, 2, 2)};
+  };
+  EXPECT_EQ(layers(1), (std::vector<bool>{false, false, false})) << "ground";
+  EXPECT_EQ(layers(2), (std::vector<bool>{true, false, false})) << "at the border";
+  EXPECT_EQ(layers(3), (std::vector<bool>{true, true, false}));
+  EXPECT_EQ(layers(4), (std::vector<bool>{true, true, true})) << "the highest point counts";
+  EXPECT_EQ(context.occupied_cells(), 6);
+  EXPECT_EQ(context.intensity[2 * 10 + 1], quantise_intensity(0.9f)) << "intensities are of all points";
+}
+
 TEST(Describe, NoPointsNoCells) {
   EXPECT_EQ(describe({}, {}).occupied_cells(), 0);
-  const Point one{3.f, 4.f, 0.f, 0.5f};
+  const Point one{3.f, 4.f, -1.f, 0.5f};
   EXPECT_EQ(describe(std::span<const Point>(&one, 1), {}).occupied_cells(), 1);
 }
 

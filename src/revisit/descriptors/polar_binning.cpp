@@ -40,7 +40,8 @@ HWY_INLINE hn::Mask<F> NearBorder(F f, VF coordinate, float margin) {
   return hn::Lt(hn::Abs(hn::Sub(coordinate, hn::Round(coordinate))), hn::Set(f, margin));
 }
 
-void BinPoints(const Point* HWY_RESTRICT points, size_t count, const PolarGrid& grid, uint16_t* HWY_RESTRICT cells) {
+void BinPoints(const Point* HWY_RESTRICT points, size_t count, const PolarGrid& grid, const Levels& levels,
+               uint16_t* HWY_RESTRICT cells, uint8_t* HWY_RESTRICT tops) {
   const F f;
   const I d;
   const size_t lanes = hn::Lanes(f);
@@ -55,6 +56,9 @@ void BinPoints(const Point* HWY_RESTRICT points, size_t count, const PolarGrid& 
   constexpr size_t kMostLanes = HWY_MAX_BYTES / sizeof(float);
   HWY_ALIGN int32_t cell[kMostLanes];
   HWY_ALIGN int32_t value[kMostLanes];
+  HWY_ALIGN int32_t top[kMostLanes];
+  const VF lowest = hn::Set(f, levels.lowest_m), steps_per_m = hn::Set(f, levels.steps_per_m);
+  const VF last_level = hn::Set(f, static_cast<float>(levels.count - 1));
   uint8_t border[kMostLanes / 8 + 8];
 
   size_t i = 0;
@@ -77,6 +81,10 @@ void BinPoints(const Point* HWY_RESTRICT points, size_t count, const PolarGrid& 
     const VF finite = hn::IfThenElseZero(hn::Ge(intensity, hn::Zero(f)), clamped);  // NaN becomes 0
     hn::Store(hn::Add(hn::NearestInt(hn::Mul(finite, hn::Set(f, 255.f))), hn::Set(d, 1)), d, value);
 
+    const VF steps = hn::Mul(hn::Sub(z, lowest), steps_per_m);
+    const VF level = hn::Add(hn::Min(hn::Floor(steps), last_level), hn::Set(f, 1.f));
+    hn::Store(hn::ConvertTo(d, hn::IfThenElseZero(hn::Ge(steps, hn::Zero(f)), level)), d, top);
+
     if (HWY_UNLIKELY(!hn::AllFalse(f, near))) {
       hn::StoreMaskBits(f, near, border);
       for (size_t lane = 0; lane < lanes; ++lane) {
@@ -88,9 +96,10 @@ void BinPoints(const Point* HWY_RESTRICT points, size_t count, const PolarGrid& 
     for (size_t lane = 0; lane < lanes; ++lane) {
       uint16_t& target = cells[cell[lane]];
       target = std::max(target, static_cast<uint16_t>(value[lane]));
+      tops[cell[lane]] = std::max(tops[cell[lane]], static_cast<uint8_t>(top[lane]));
     }
   }
-  bin_points_scalar(points + i, count - i, grid, cells);
+  bin_points_scalar(points + i, count - i, grid, levels, cells, tops);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -102,8 +111,9 @@ namespace revisit::descriptors_internal {
 
 HWY_EXPORT(BinPoints);
 
-void bin_points(const Point* points, std::size_t count, const PolarGrid& grid, std::uint16_t* cells) {
-  HWY_DYNAMIC_DISPATCH(BinPoints)(points, count, grid, cells);
+void bin_points(const Point* points, std::size_t count, const PolarGrid& grid, const Levels& levels,
+                std::uint16_t* cells, std::uint8_t* tops) {
+  HWY_DYNAMIC_DISPATCH(BinPoints)(points, count, grid, levels, cells, tops);
 }
 
 }  // namespace revisit::descriptors_internal

@@ -56,9 +56,13 @@ TEST_F(EveryTarget, EqualsTheScalarReferenceBitForBit) {
       for (const std::size_t count : {0u, 1u, 15u, 20000u}) {
         const auto points = hard_points(grid, count, 9);
         std::vector<std::uint16_t> fast(static_cast<std::size_t>(grid.rings * grid.sectors) + 1, 0), slow = fast;
-        bin_points(points.data(), points.size(), grid, fast.data());
-        bin_points_scalar(points.data(), points.size(), grid, slow.data());
+        std::vector<std::uint8_t> fast_tops(fast.size(), 0), slow_tops = fast_tops;
+        const Levels levels{-1.2f, 0.7f, count % 2 == 0 ? 4 : 0};
+        bin_points(points.data(), points.size(), grid, levels, fast.data(), fast_tops.data());
+        bin_points_scalar(points.data(), points.size(), grid, levels, slow.data(), slow_tops.data());
         fast.back() = slow.back() = 0;  // beyond the range
+        fast_tops.back() = slow_tops.back() = 0;
+        EXPECT_EQ(fast_tops, slow_tops) << instruction_set_name();
         EXPECT_EQ(fast, slow) << instruction_set_name() << ", " << grid.rings << " x " << grid.sectors;
       }
     }

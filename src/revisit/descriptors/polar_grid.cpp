@@ -18,12 +18,20 @@ int cell_of(const PolarGrid& grid, float x, float y) {
   return (sector % grid.sectors) * grid.rings + static_cast<int>(ring);  // theta = pi is sector 0
 }
 
-void bin_points_scalar(const Point* points, std::size_t count, const PolarGrid& grid, std::uint16_t* cells) {
+int levels_of(const Levels& levels, float z) {
+  const float steps = (z - levels.lowest_m) * levels.steps_per_m;
+  if (levels.count == 0 || !(steps >= 0.f)) return 0;
+  return 1 + static_cast<int>(std::min(std::floor(steps), static_cast<float>(levels.count - 1)));
+}
+
+void bin_points_scalar(const Point* points, std::size_t count, const PolarGrid& grid, const Levels& levels,
+                       std::uint16_t* cells, std::uint8_t* tops) {
   for (std::size_t i = 0; i < count; ++i) {
     const int cell = cell_of(grid, points[i].x, points[i].y);
     if (cell < 0) continue;
     const auto value = static_cast<std::uint16_t>(1 + quantise_intensity(points[i].intensity));
     cells[cell] = std::max(cells[cell], value);
+    tops[cell] = std::max(tops[cell], static_cast<std::uint8_t>(levels_of(levels, points[i].z)));
   }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/descriptors/similarity.hpp>
 
+#include <bit>
 #include <cmath>
 #include <stdexcept>
 
@@ -9,14 +10,34 @@
 
 namespace revisit {
 
+namespace {
+
+std::size_t occupied(const DescriptorView& descriptor) {
+  const std::size_t bits = static_cast<std::size_t>(descriptor.rows()) * static_cast<std::size_t>(descriptor.sectors);
+  std::size_t count = 0;
+  for (std::size_t w = 0; w < revisit_bits_words(static_cast<std::uint32_t>(bits)); ++w)
+    count += static_cast<std::size_t>(std::popcount(descriptor.occupancy[w]));
+  return count;
+}
+
+}  // namespace
+
+double geometry_score(const DescriptorView& query, const DescriptorView& candidate, std::uint32_t differing_cells) {
+  const auto differing = static_cast<double>(differing_cells);
+  if (query.levels == 0) return 1.0 - differing / static_cast<double>(query.cells());
+  const std::size_t in_both = occupied(query) + occupied(candidate);
+  return in_both == 0 ? 0.0 : 1.0 - differing / static_cast<double>(in_both);
+}
+
 GeometryMatch match_geometry(const DescriptorView& query, const DescriptorView& candidate) {
-  if (query.rings != candidate.rings || query.sectors != candidate.sectors || query.cells() == 0)
+  if (query.rings != candidate.rings || query.sectors != candidate.sectors || query.levels != candidate.levels ||
+      query.cells() == 0)
     throw std::invalid_argument("descriptors of different grids cannot be compared");
   std::uint32_t shift = 0;
   const std::uint32_t distance =
-      revisit_bits_min_hamming(query.occupancy, candidate.occupancy, static_cast<std::uint32_t>(query.rings),
+      revisit_bits_min_hamming(query.occupancy, candidate.occupancy, static_cast<std::uint32_t>(query.rows()),
                                static_cast<std::uint32_t>(query.sectors), &shift);
-  return {1.0 - static_cast<double>(distance) / static_cast<double>(query.cells()), static_cast<int>(shift)};
+  return {geometry_score(query, candidate, distance), static_cast<int>(shift)};
 }
 
 double match_intensity(const DescriptorView& query, const DescriptorView& candidate, int shift_columns) {

@@ -12,6 +12,9 @@ struct GeometryMatch {
   double score = 0.0;     ///< 1 - min over k of popcount(I_k^q xor I^c) / (N_r N_s), in [0, 1]
   int shift_columns = 0;  ///< k: column j of the query lies on column j + k of the candidate
 };
+/// The score for a number of differing cells. Images with levels of height are mostly empty, and cells that are empty
+/// in both say little: there it is the overlap (Dice), 1 - differing / (occupied cells of the one + of the other).
+double geometry_score(const DescriptorView& query, const DescriptorView& candidate, std::uint32_t differing_cells);
 GeometryMatch match_geometry(const DescriptorView& query, const DescriptorView& candidate);
 
 /// Phi_i (eqs. 9-10): mean over columns of the cosine between the query shifted by k and the candidate. A column that

@@ -15,7 +15,7 @@ IntensityScanContext random_context(int rings, int sectors, double density, unsi
   std::bernoulli_distribution occupied(density);
   std::uniform_int_distribution<int> reading(0, 255);
   IntensityScanContext context{
-      rings, sectors, std::vector<std::uint8_t>(static_cast<std::size_t>(rings * sectors)), {}};
+      rings, sectors, 0, std::vector<std::uint8_t>(static_cast<std::size_t>(rings * sectors)), {}};
   context.occupancy.assign((context.cells() + 63) / 64, 0);
   for (std::size_t i = 0; i < context.cells(); ++i)
     if (occupied(random)) {
@@ -49,12 +49,12 @@ TEST(MatchDescriptors, ATurnedPlaceScoresFullAndTellsItsYaw) {
 }
 
 TEST(MatchIntensity, EmptyColumnsDoNotCount) {
-  IntensityScanContext a{2, 3, {10, 20, 0, 0, 0, 0}, {0b000011}};
+  IntensityScanContext a{2, 3, 0, {10, 20, 0, 0, 0, 0}, {0b000011}};
   IntensityScanContext b = a;
   EXPECT_NEAR(match_intensity(a, b, 0), 1.0, 1e-12) << "two columns are empty in both";
   b.intensity[2] = 50;  // now one of them is empty in one scan only
   EXPECT_NEAR(match_intensity(a, b, 0), 0.5, 1e-12);
-  const IntensityScanContext none{2, 3, std::vector<std::uint8_t>(6, 0), {0}};
+  const IntensityScanContext none{2, 3, 0, std::vector<std::uint8_t>(6, 0), {0}};
   EXPECT_EQ(match_intensity(none, none, 0), 0.0);
 }
 

@@ -2,6 +2,7 @@
 #include <revisit/pipeline/loop_detector.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <numeric>
 #include <stdexcept>
@@ -37,6 +38,15 @@ Result<Detection> LoopDetector::process(Scan scan, const std::optional<Pose>& T_
   if (!detection) return detection.error();
   remember(*std::move(prepared), T_world_lidar);
   return detection;
+}
+
+double LoopDetector::Opinion::score() const {
+  // Registration knows best, then the view from overhead, then the descriptors.
+  const double evidence = candidate.geometry_score / 4.0 + overlap / 4.0 + (geometric ? geometric->inlier_ratio : 0.0);
+  if (!geometric || !reason.empty()) return evidence;
+  // A loop over more than this is a right constraint, but not the same place (docs/evaluation.md).
+  constexpr double kSamePlace_m = 4.0;
+  return evidence + (distance_m() <= kSamePlace_m ? 2.0 : 1.0);
 }
 
 Status LoopDetector::add(Scan scan, const std::optional<Pose>& T_world_lidar) {
@@ -85,15 +95,17 @@ Result<Detection> LoopDetector::detect(const PreparedScan& prepared, const std::
 
   Stopwatch watch;
   const double stamp_s = prepared.scan.stamp_s;
-  detection.had_searchable_past =
-      past == Past::kAll ? index_.size() > 0 : index_.has_searchable_past(detection.frame, stamp_s);
+  if (past == Past::kOldEnough)
+    detection.newest_searchable = index_.newest_searchable(detection.frame, stamp_s);
+  else if (!places_.empty())
+    detection.newest_searchable = places_.rbegin()->first;
   auto candidates = past == Past::kAll ? index_.search_all(prepared.descriptor)
                                        : index_.search(detection.frame, stamp_s, prepared.descriptor);
   if (!candidates) return candidates.error();
   detection.candidates = *std::move(candidates);
   detection.search_ms = watch.lap_ms();
   if (detection.candidates.empty())
-    detection.reason = detection.had_searchable_past ? "no place like it" : "no searchable past";
+    detection.reason = detection.newest_searchable ? "no place like it" : "no searchable past";
   else
     verify(detection, prepared);
 
@@ -107,65 +119,120 @@ Result<Detection> LoopDetector::detect(const PreparedScan& prepared, const std::
 }
 
 void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
-  const auto query_descriptor = [&](FrameId frame) -> std::optional<DescriptorView> {
-    const auto found = std::find_if(recent_queries_.begin(), recent_queries_.end(),
-                                    [&](const auto& each) { return each.first == frame; });
-    if (found == recent_queries_.end()) return std::nullopt;
-    return found->second;
-  };
-  const auto match_descriptor = [&](FrameId frame) { return index_.find(frame); };
-  const auto count = std::min(detection.candidates.size(), static_cast<std::size_t>(parameters_.geometric.candidates));
-  struct Opinion {
-    TemporalEvidence temporal;
-    std::optional<GeometricEvidence> geometric;
-    std::string reason;
-  };
-  std::vector<Opinion> opinions(count);
+  std::vector<Opinion> opinions;
+  for (const LoopCandidate& candidate : detection.candidates) opinions.emplace_back(candidate);
   Stopwatch watch;
-  for (std::size_t i = 0; i < count; ++i) {
-    const LoopCandidate& candidate = detection.candidates[i];
-    Opinion& opinion = opinions[i];
-    opinion.temporal =
-        check_temporal(detection.frame, candidate.match, query_descriptor, match_descriptor, parameters_.temporal);
-    if (candidate.score() < parameters_.geometric.min_descriptor_score) {
-      char text[96];
-      std::snprintf(text, sizeof text, "descriptor score %.3f below %.3f", candidate.score(),
-                    parameters_.geometric.min_descriptor_score);
-      opinion.reason = text;
-    } else if (!opinion.temporal.consistent) {
-      opinion.reason = opinion.temporal.reason;
-    }
+  OverheadSearch overhead(prepared.cloud);
+  if (parameters_.geometric.overhead_search) {
+    for (Opinion& each : opinions) look_from_overhead(overhead, each);
+    std::stable_sort(opinions.begin(), opinions.end(),
+                     [](const Opinion& a, const Opinion& b) { return a.overlap > b.overlap; });
   }
+  const auto count = std::min(opinions.size(), static_cast<std::size_t>(parameters_.geometric.candidates));
+  opinions.erase(opinions.begin() + static_cast<std::ptrdiff_t>(count), opinions.end());
+  detection.geometric_ms += watch.lap_ms();
+  for (Opinion& each : opinions) check_temporal_and_scores(detection.frame, each);
   detection.temporal_ms += watch.lap_ms();
 
   // Each candidate is registered on its own; who finishes first does not matter.
   std::optional<ScanGeometry> query;
   if (std::any_of(opinions.begin(), opinions.end(), [](const Opinion& o) { return o.reason.empty(); }))
     query.emplace(prepared.cloud);
+  const auto register_one = [&](Opinion& each) {
+    ScanGeometry match(places_.at(each.candidate.match).cloud);
+    each.geometric = check_geometric(match, *query, each.T_guess_match_query, parameters_.geometric);
+    each.reason = each.geometric->reason;
+  };
   tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-    if (!opinions[i].reason.empty()) return;
-    ScanGeometry match(places_.at(detection.candidates[i].match).cloud);
-    opinions[i].geometric = check_geometric(match, *query, detection.candidates[i].yaw_rad, parameters_.geometric);
-    opinions[i].reason = opinions[i].geometric->reason;
+    if (opinions[i].reason.empty()) register_one(opinions[i]);
   });
+
+  // The answer is the one that fits best.
+  const Opinion* best = nullptr;
+  for (const Opinion& each : opinions)
+    if (best == nullptr || each.score() > best->score()) best = &each;
+  if (best == nullptr) return;
+  Opinion answer = *best;
+  if (answer.reason.empty() && parameters_.geometric.overhead_search)
+    if (auto nearer = nearer_place(overhead, answer, detection)) {
+      check_temporal_and_scores(detection.frame, *nearer);
+      if (nearer->reason.empty()) register_one(*nearer);
+      if (nearer->reason.empty() && nearer->distance_m() < answer.distance_m()) answer = *std::move(nearer);
+    }
   detection.geometric_ms += watch.lap_ms();
 
-  for (std::size_t i = 0; i < count && !detection.loop; ++i) {
-    const LoopCandidate& candidate = detection.candidates[i];
-    Opinion& opinion = opinions[i];
-    // The answer is the first candidate, unless a later one fits the scan better.
-    const double score = candidate.score() / 2.0 + (opinion.geometric ? opinion.geometric->inlier_ratio : 0.0);
-    const bool is_loop = opinion.reason.empty();
-    if (detection.answer && !is_loop && score <= detection.score) continue;
-    detection.answer = candidate;
-    detection.temporal = std::move(opinion.temporal);
-    detection.score = score;
-    detection.reason = opinion.reason;
-    detection.geometric = std::move(opinion.geometric);
-    if (is_loop)
-      detection.loop = LoopConstraint{detection.frame, candidate.match, detection.geometric->T_match_query,
-                                      detection.geometric->inlier_ratio, detection.geometric->rmse_m};
+  detection.answer = answer.candidate;
+  detection.temporal = std::move(answer.temporal);
+  detection.score = answer.score();
+  detection.reason = answer.reason;
+  detection.geometric = std::move(answer.geometric);
+  if (detection.reason.empty())
+    detection.loop = LoopConstraint{detection.frame, answer.candidate.match, detection.geometric->T_match_query,
+                                    detection.geometric->inlier_ratio, detection.geometric->rmse_m};
+}
+
+void LoopDetector::look_from_overhead(OverheadSearch& overhead, Opinion& opinion) const {
+  // Half a sector of the descriptor and a little more.
+  const double yaw_reach_rad = kPi / parameters_.descriptor.sectors + to_radians(3.0);
+  constexpr int kReach_m = 6;
+  const OverheadMatch found =
+      overhead.search(places_.at(opinion.candidate.match).cloud, opinion.candidate.yaw_rad, yaw_reach_rad, kReach_m);
+  opinion.T_guess_match_query = planar_pose(found.x_m, found.y_m, found.yaw_rad);
+  opinion.overlap = found.overlap;
+  if (found.overlap < parameters_.geometric.min_overlap) {
+    char text[96];
+    std::snprintf(text, sizeof text, "overlap from overhead %.2f below %.2f", found.overlap,
+                  parameters_.geometric.min_overlap);
+    opinion.reason = text;
   }
+}
+
+void LoopDetector::check_temporal_and_scores(FrameId frame, Opinion& opinion) const {
+  const auto query_descriptor = [&](FrameId of) -> std::optional<DescriptorView> {
+    const auto found = std::find_if(recent_queries_.begin(), recent_queries_.end(),
+                                    [&](const auto& each) { return each.first == of; });
+    if (found == recent_queries_.end()) return std::nullopt;
+    return found->second;
+  };
+  const auto match_descriptor = [&](FrameId of) { return index_.find(of); };
+  opinion.temporal =
+      check_temporal(frame, opinion.candidate.match, query_descriptor, match_descriptor, parameters_.temporal);
+  if (!opinion.reason.empty()) return;
+  if (opinion.candidate.score() < parameters_.geometric.min_descriptor_score) {
+    char text[96];
+    std::snprintf(text, sizeof text, "descriptor score %.3f below %.3f", opinion.candidate.score(),
+                  parameters_.geometric.min_descriptor_score);
+    opinion.reason = text;
+  } else if (!opinion.temporal.consistent) {
+    opinion.reason = opinion.temporal.reason;
+  }
+}
+
+std::optional<LoopDetector::Opinion> LoopDetector::nearer_place(OverheadSearch& overhead, const Opinion& answer,
+                                                                const Detection& detection) const {
+  constexpr double kNear_m = 1.5;
+  const Pose& T = answer.geometric->T_match_query;
+  if (answer.distance_m() < kNear_m) return std::nullopt;
+  const double yaw_rad = yaw_of(T);
+  const std::int64_t around = 2 * std::int64_t{parameters_.retrieval.separation_frames};
+  std::optional<Opinion> nearest;
+  double least_m = answer.distance_m();
+  for (std::int64_t frame = answer.candidate.match.value - around; frame <= answer.candidate.match.value + around;
+       ++frame) {
+    const auto place = places_.find(FrameId{frame});
+    if (place == places_.end() || *detection.newest_searchable < FrameId{frame} ||
+        frame == answer.candidate.match.value)
+      continue;
+    const OverheadMatch found = overhead.search(place->second.cloud, yaw_rad, to_radians(3.0), 6);
+    const double distance_m = std::hypot(found.x_m, found.y_m);
+    if (found.overlap < parameters_.geometric.min_overlap || distance_m >= least_m) continue;
+    least_m = distance_m;
+    nearest.emplace(answer.candidate);
+    nearest->candidate.match = FrameId{frame};
+    nearest->T_guess_match_query = planar_pose(found.x_m, found.y_m, found.yaw_rad);
+    nearest->overlap = found.overlap;
+  }
+  return nearest;
 }
 
 void LoopDetector::remember(PreparedScan prepared, const std::optional<Pose>& T_world_lidar) {

@@ -9,6 +9,7 @@
 
 #include <revisit/core/results.hpp>
 #include <revisit/pipeline/prepare.hpp>
+#include <revisit/registration/overhead_search.hpp>
 #include <revisit/retrieval/place_index.hpp>
 #include <revisit/verification/geometric.hpp>
 #include <revisit/verification/temporal.hpp>
@@ -18,7 +19,7 @@ namespace revisit {
 /// Everything found out about one scan.
 struct Detection {
   FrameId frame;
-  bool had_searchable_past = false;
+  std::optional<FrameId> newest_searchable;    ///< the newest place that the scan could be matched with
   std::vector<LoopCandidate> candidates;       ///< what retrieval proposed, best first
   std::optional<LoopCandidate> answer;         ///< the candidate that the rest of the evidence is about
   std::optional<TemporalEvidence> temporal;    ///< of the answer; absent where no candidate was found
@@ -66,7 +67,26 @@ class LoopDetector {
 
   Result<PreparedScan> prepare(Scan scan);
   Result<Detection> detect(const PreparedScan& prepared, const std::optional<Pose>& T_world_lidar, Past past);
+  // What is found out about a candidate, step by step; `reason` says why it is no loop.
+  struct Opinion {
+    explicit Opinion(const LoopCandidate& of) : candidate(of), T_guess_match_query(planar_pose(0, 0, of.yaw_rad)) {}
+    double score() const;
+    double distance_m() const { return geometric->T_match_query.translation().norm(); }
+
+    LoopCandidate candidate;
+    Pose T_guess_match_query;
+    double overlap = 0.0;  ///< seen from overhead
+    TemporalEvidence temporal;
+    std::optional<GeometricEvidence> geometric;
+    std::string reason;
+  };
+
   void verify(Detection& detection, const PreparedScan& prepared);
+  void look_from_overhead(OverheadSearch& overhead, Opinion& opinion) const;
+  void check_temporal_and_scores(FrameId frame, Opinion& opinion) const;
+  // The place among the answer's neighbours that the query stands nearest to, if it is another.
+  std::optional<Opinion> nearer_place(OverheadSearch& overhead, const Opinion& answer,
+                                      const Detection& detection) const;
   void remember(PreparedScan prepared, const std::optional<Pose>& T_world_lidar);
 
   Parameters parameters_;

@@ -30,7 +30,7 @@ TEST(LoopDetector, FindsThePlaceAndThePoseOfAReverseVisit) {
     const auto detection =
         detector.process(scan_at(world, i, SyntheticWorld::at(-28.0 + 8.0 * i, 0, 0), static_cast<unsigned>(i)));
     ASSERT_TRUE(detection) << detection.error().message;
-    EXPECT_FALSE(detection->had_searchable_past);
+    EXPECT_FALSE(detection->newest_searchable);
     EXPECT_EQ(detection->reason, "no searchable past");
   }
   const Pose T_query = SyntheticWorld::at(5.0, 1.0, to_radians(176.0));
@@ -133,7 +133,8 @@ TEST(LoopDetectorOnRealScans, NoScanOfOneTownIsAcceptedInAnother) {
   REVISIT_NEEDS_SHARED_DATA();
   const auto town = open_recording(shared_data() / "kitti_raw_0005"),
              away = open_recording(shared_data() / "kitti00_mini");
-  const Parameters parameters;
+  Parameters parameters;
+  parameters.geometric.min_overlap = 0.0;  // so that every scan comes as far as registration
   LoopDetector detector(parameters, *estimate_intensity_scale(**town, parameters));
   for (std::size_t i = 0; i < (*town)->size(); ++i) ASSERT_TRUE(detector.add(*(*town)->read(i)));
   for (std::size_t i = 0; i < (*away)->size(); i += 4) {  // every fourth: each asks for three registrations
@@ -141,7 +142,7 @@ TEST(LoopDetectorOnRealScans, NoScanOfOneTownIsAcceptedInAnother) {
     ASSERT_TRUE(detection);
     EXPECT_FALSE(detection->loop) << "frame " << detection->frame.value;
     ASSERT_TRUE(detection->geometric) << "it came as far as registration";
-    EXPECT_LT(detection->geometric->inlier_ratio, 0.4) << "and not near the threshold";
+    EXPECT_LT(detection->geometric->inlier_ratio, 0.3) << "and not near the threshold";
   }
 }
 

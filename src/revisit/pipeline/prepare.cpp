@@ -32,6 +32,24 @@ double Stopwatch::lap_ms() {
   return lap;
 }
 
+namespace {
+
+// The middle of the heights of the ground nearby; where there is none, that of a sensor on a car.
+double ground_below_sensor_m(std::span<const Point> points, std::span<const std::uint8_t> is_ground) {
+  constexpr float kNearby_m = 15.f;
+  constexpr std::size_t kFewest = 50;
+  std::vector<float> heights;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (is_ground[i] != 0 && points[i].x * points[i].x + points[i].y * points[i].y < kNearby_m * kNearby_m)
+      heights.push_back(points[i].z);
+  if (heights.size() < kFewest) return kGroundBelowCarSensor_m;
+  const auto middle = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2);
+  std::nth_element(heights.begin(), middle, heights.end());
+  return static_cast<double>(*middle);
+}
+
+}  // namespace
+
 Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const IntensityScale& scale,
                                   const IntensityCalibration& calibration) {
   require_consistent(scan);
@@ -51,10 +69,11 @@ Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const
                       rings_fit ? std::span<const std::uint16_t>(rings.of_point) : std::span<const std::uint16_t>());
   prepared.ms.intensity = watch.lap_ms();
 
+  prepared.ground_z_m = ground_below_sensor_m(prepared.scan.points, prepared.ground.is_ground);
   prepared.descriptor =
       describe(parameters.preprocess.remove_ground ? above_ground(prepared.scan, prepared.ground.is_ground)
                                                    : prepared.scan.points,
-               parameters.descriptor);
+               parameters.descriptor, prepared.ground_z_m);
   prepared.ms.describe = watch.lap_ms();
   if (prepared.descriptor.occupied_cells() < parameters.descriptor.min_occupied_cells)
     return Error{"frame " + std::to_string(prepared.scan.frame.value) + ": " +

@@ -21,7 +21,8 @@ struct PreparedScan {
   Scan scan;
   GroundSegmentation ground;
   IntensityScanContext descriptor;
-  ThinCloud cloud;  ///< for registration; the ground is kept and marked
+  double ground_z_m = 0.0;  ///< where the ground below the sensor lies, in its frame
+  ThinCloud cloud;          ///< for registration; the ground is kept and marked
 
   struct Milliseconds {
     double filter = 0.0, ground = 0.0, intensity = 0.0, describe = 0.0, thin = 0.0;

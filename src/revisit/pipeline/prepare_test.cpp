@@ -14,6 +14,7 @@ Scan some_scan() { return SyntheticWorld(41).scan(SyntheticWorld::at(0, 0, 0), {
 
 TEST(PrepareScan, GroundIsDescribedOnlyIfAsked) {
   Parameters keep, remove;
+  keep.descriptor.levels = remove.descriptor.levels = 0;  // layers begin above the ground anyway
   remove.preprocess.remove_ground = true;
   const auto with = prepare_scan(some_scan(), keep, {});
   const auto without = prepare_scan(some_scan(), remove, {});

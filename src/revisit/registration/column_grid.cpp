@@ -83,8 +83,8 @@ bool ColumnGrid::nearest(const Eigen::Vector3f& p, float squared_reach_m2, std::
           found = true;
         });
     if ((found && squared_distance_m2 <= radius_m * radius_m) || radius_m >= reach_m) return found;
-    const bool is_everything = x.begin == 0 && y.begin == 0 && x.end == count_[0] && y.end == count_[1] &&
-                               heights == levels(-1e9f, 1e9f);
+    const bool is_everything =
+        x.begin == 0 && y.begin == 0 && x.end == count_[0] && y.end == count_[1] && heights == levels(-1e9f, 1e9f);
     if (is_everything) return found;
   }
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_reduce.h>
@@ -24,6 +25,7 @@ Pose small_motion(const Vector6& xi) {  // rotation first, then translation
 }
 
 constexpr double kAllPointsBelow_m = 1.0;
+constexpr float kSeenMargin_m = 1.f;  // what ranges within a cell of seen space may be off
 
 // The normal equations of a Gauss-Newton step, summed over points.
 struct Equations {
@@ -88,7 +90,7 @@ bool step(const SurfaceCloud& target, const SurfaceCloud& source, double width_m
 }
 
 struct DirectionalAgreement {
-  std::size_t visible = 0, inliers = 0;
+  std::size_t visible = 0, inliers = 0, seen_through = 0;
   double squared_sum = 0.0;
 };
 
@@ -104,13 +106,18 @@ DirectionalAgreement agreement_one_way(const SurfaceCloud& to, const SurfaceClou
     if (p.norm() > farthest_m) continue;
     ++result.visible;
     const auto neighbour = to.nearest(p.cast<float>(), reach2);
-    if (!neighbour) continue;
-    const Eigen::Vector3d n = to.normal(neighbour->index).cast<double>();
-    const Eigen::Vector3d d = p - to.point(neighbour->index).cast<double>();
-    const double distance = n.squaredNorm() < 0.5 ? d.norm() : std::abs(n.dot(d));
-    if (distance > inlier_distance_m) continue;
-    ++result.inliers;
-    result.squared_sum += distance * distance;
+    double distance = std::numeric_limits<double>::infinity();
+    if (neighbour) {
+      const Eigen::Vector3d n = to.normal(neighbour->index).cast<double>();
+      const Eigen::Vector3d d = p - to.point(neighbour->index).cast<double>();
+      distance = n.squaredNorm() < 0.5 ? d.norm() : std::abs(n.dot(d));
+    }
+    if (distance <= inlier_distance_m) {
+      ++result.inliers;
+      result.squared_sum += distance * distance;
+    } else if (to.seen().look(p.cast<float>(), kSeenMargin_m) == SeenSpace::Verdict::kThrough) {
+      ++result.seen_through;
+    }
   }
   return result;
 }
@@ -159,6 +166,11 @@ Agreement measure_agreement(const SurfaceCloud& target, const SurfaceCloud& sour
   };
   Agreement result;
   result.inlier_ratio = std::min(ratio(forth), ratio(back));
+  const auto undisputed = [](const DirectionalAgreement& a) {
+    const std::size_t known = a.inliers + a.seen_through;
+    return known == 0 ? 0.0 : static_cast<double>(a.inliers) / static_cast<double>(known);
+  };
+  result.free_space_agreement = std::min(undisputed(forth), undisputed(back));
   const std::size_t inliers = forth.inliers + back.inliers;
   if (inliers > 0) result.rmse_m = std::sqrt((forth.squared_sum + back.squared_sum) / static_cast<double>(inliers));
   return result;

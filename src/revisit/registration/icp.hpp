@@ -21,7 +21,9 @@ IcpResult align_icp(const SurfaceCloud& target, const SurfaceCloud& source, cons
 struct Agreement {
   double inlier_ratio = 0.0;  ///< smaller of both directions: share of the points above ground with a surface within
                               ///< reach, among those that the other scan could have seen
-  double rmse_m = 0.0;        ///< point-to-plane, over the inliers above ground of both directions
+  double free_space_agreement = 0.0;  ///< smaller of both directions: inliers among these and the points that stand
+                                      ///< where the other scan saw through
+  double rmse_m = 0.0;                ///< point-to-plane, over the inliers above ground of both directions
 };
 Agreement measure_agreement(const SurfaceCloud& target, const SurfaceCloud& source, const Pose& T_target_source,
                             double inlier_distance_m);

@@ -128,7 +128,7 @@ TEST(Icp, OfAScanWithItselfIsTheIdentity) {
 
 TEST(Icp, TooLittleToAlignDoesNotConverge) {
   const SurfaceCloud a(thin_scan(SyntheticWorld::at(0, 0, 0)));
-  const SurfaceCloud nothing(ThinCloud{}), one(ThinCloud{{Eigen::Vector3f(1, 2, 3)}, {0}});
+  const SurfaceCloud nothing(ThinCloud{}), one(thin(std::vector<Point>{{1, 2, 3, 0}}, {}, 1.0));
   for (const SurfaceCloud* each : {&nothing, &one}) {
     EXPECT_FALSE(align_icp(a, *each, Pose::Identity()).converged);
     EXPECT_FALSE(align_icp(*each, a, Pose::Identity()).converged);

@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 
 #include <revisit/core/scan.hpp>
+#include <revisit/registration/seen_space.hpp>
 
 namespace revisit {
 
@@ -20,6 +21,7 @@ struct ThinCloud {
                                         ///< the points alone
   std::vector<std::uint8_t> is_ground;  ///< one a point: most of its voxel lay on the ground
   float voxel_m = 1.f;
+  SeenSpace seen;  ///< of the scan it was thinned from
 };
 
 /// Thins `points`, which are finite, with cubic voxels of `voxel_m`; points more than 1,024 voxels out are taken
@@ -40,6 +42,7 @@ class SurfaceCloud {
   /// Unit normal, sign arbitrary; zero where fewer than five neighbours gave none.
   const Eigen::Vector3f& normal(std::size_t i) const { return normals_[i]; }
   bool is_ground(std::size_t i) const { return cloud_.is_ground[i] != 0; }
+  const SeenSpace& seen() const { return cloud_.seen; }
 
   struct Neighbour {
     std::size_t index = 0;

@@ -40,6 +40,7 @@ ThinCloud thin(std::span<const Point> points, std::span<const std::uint8_t> is_g
   ThinCloud cloud;
   cloud.voxel_m = static_cast<float>(voxel_m);
   if (points.empty()) return cloud;
+  cloud.seen = SeenSpace(points);
   Axis x(cloud.voxel_m), y(cloud.voxel_m), z(cloud.voxel_m);
   for (const Point& p : points) {
     x.include(p.x);
@@ -54,7 +55,8 @@ ThinCloud thin(std::span<const Point> points, std::span<const std::uint8_t> is_g
   std::vector<std::uint32_t> sorted(points.size());
   {
     std::vector<std::uint32_t> next(begin.begin(), begin.end() - 1);
-    for (std::size_t i = 0; i < points.size(); ++i) sorted[next[column_of(points[i])]++] = static_cast<std::uint32_t>(i);
+    for (std::size_t i = 0; i < points.size(); ++i)
+      sorted[next[column_of(points[i])]++] = static_cast<std::uint32_t>(i);
   }
   std::vector<Voxel> column(z.cells());
   std::vector<std::size_t> heights;

@@ -165,7 +165,8 @@ Result<std::vector<NearImage>> nearest_images(const PlaceStore& store, std::size
   if (counts != nullptr) *counts = {places, 0};
   std::vector<NearImage> result;
   if (places == 0 || count == 0) return result;
-  const auto rings = static_cast<std::uint32_t>(store.rings()), sectors = static_cast<std::uint32_t>(store.sectors());
+  const std::uint32_t rings = store.rows();
+  const auto sectors = static_cast<std::uint32_t>(store.sectors());
   thread_local AlignedVector<std::uint8_t> memory;
   memory.resize(std::max(memory.size(), revisit_bits_query_bytes(rings, sectors)));
   revisit_bits_query prepared;

@@ -18,11 +18,11 @@ struct FileHeader {
   char magic[8] = {'R', 'E', 'V', 'I', 'S', 'I', 'T', 'P'};
   std::uint32_t byte_order = 0x01020304;
   std::uint32_t version = 1;
-  std::uint32_t rings = 0, sectors = 0;
+  std::uint32_t rings = 0, sectors = 0, levels = 0, unused = 0;
   std::uint64_t places = 0;
   std::uint64_t checksum = 0;  ///< of the header with this field 0, and of all bytes up to the first chunk
 };
-static_assert(sizeof(FileHeader) == 40);
+static_assert(sizeof(FileHeader) == 48);
 
 using Checksums = std::array<std::uint64_t, ChunkLayout::kParts>;
 
@@ -77,6 +77,7 @@ Status PlaceStore::save(const std::string& path) const {
   FileHeader header;
   header.rings = static_cast<std::uint32_t>(rings_);
   header.sectors = static_cast<std::uint32_t>(sectors_);
+  header.levels = static_cast<std::uint32_t>(levels_);
   header.places = places;
   header.checksum = checksum_of(header, table.data(), chunks);
 
@@ -115,17 +116,19 @@ Result<std::unique_ptr<PlaceStore>> PlaceStore::open(const std::string& path) {
   if (header.version != ours.version)
     return refuse("is of version " + std::to_string(header.version) + ", this program reads version " +
                   std::to_string(ours.version) + hint());
-  if (header.rings > 512 || header.sectors > 720 || (header.places > 0 && (header.rings == 0 || header.sectors == 0)) ||
-      header.places > kMostChunks * kChunk)
+  if (header.rings > 512 || header.sectors > 720 || header.levels > 8 ||
+      (header.places > 0 && (header.rings == 0 || header.sectors == 0)) || header.places > kMostChunks * kChunk)
     return refuse("its header names " + std::to_string(header.places) + " places on a grid of " +
-                  std::to_string(header.rings) + " x " + std::to_string(header.sectors) +
-                  "; allowed: 1 to 512 rings, 1 to 720 sectors, up to 268 million places");
+                  std::to_string(header.rings) + " x " + std::to_string(header.sectors) + " x " +
+                  std::to_string(header.levels) +
+                  "; allowed: 1 to 512 rings, 1 to 720 sectors, 0 to 8 levels, up to 268 million places");
 
   auto store = std::make_unique<PlaceStore>();
   store->path_ = path;
   store->rings_ = static_cast<int>(header.rings);
   store->sectors_ = static_cast<int>(header.sectors);
-  store->layout_ = {store->rings_, store->sectors_};
+  store->levels_ = static_cast<int>(header.levels);
+  store->layout_ = {store->rings_, store->sectors_, store->levels_};
   const std::size_t chunks = chunks_of(header.places), chunk_bytes = store->layout_.begin[ChunkLayout::kParts];
   const std::size_t expected = first_chunk(chunks) + chunks * chunk_bytes;
   if (size != expected)

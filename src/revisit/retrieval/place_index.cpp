@@ -2,7 +2,7 @@
 #include <revisit/retrieval/place_index.hpp>
 
 #include <algorithm>
-#include <cmath>
+#include <cstdlib>
 #include <stdexcept>
 
 #include <revisit/descriptors/similarity.hpp>
@@ -14,16 +14,27 @@ namespace {
 // A hair of tolerance, so that "30 s before" holds for times that were rounded to microseconds.
 constexpr double kTimeTolerance_s = 1e-6;
 
-double geometry_score(std::uint32_t distance, std::size_t cells) {
-  return 1.0 - static_cast<double>(distance) / static_cast<double>(cells);
+// The largest distance whose score passes, as far as it follows from the distance alone.
+std::uint32_t farthest_distance(double min_score, const DescriptorView& query) {
+  if (query.levels > 0) return UINT32_MAX;
+  const std::size_t cells = query.cells();
+  auto distance = static_cast<std::uint32_t>((1.0 - min_score) * static_cast<double>(cells));
+  while (distance < cells && geometry_score(query, query, distance + 1) >= min_score) ++distance;
+  while (distance > 0 && geometry_score(query, query, distance) < min_score) --distance;
+  return distance;
 }
 
-// The largest distance whose score passes.
-std::uint32_t farthest_distance(double min_score, std::size_t cells) {
-  auto distance = static_cast<std::uint32_t>((1.0 - min_score) * static_cast<double>(cells));
-  while (distance < cells && geometry_score(distance + 1, cells) >= min_score) ++distance;
-  while (distance > 0 && geometry_score(distance, cells) < min_score) --distance;
-  return distance;
+// Candidates in order; of those few frames apart, the first.
+std::vector<LoopCandidate> best_apart(const std::vector<LoopCandidate>& sorted, std::size_t count, int separation) {
+  std::vector<LoopCandidate> result;
+  for (const LoopCandidate& each : sorted) {
+    if (result.size() == count) break;
+    const bool is_apart = std::none_of(result.begin(), result.end(), [&](const LoopCandidate& other) {
+      return std::abs(each.match.value - other.match.value) <= separation;
+    });
+    if (separation == 0 || is_apart) result.push_back(each);
+  }
+  return result;
 }
 
 // How many of the first `size` places pass a test that, once failed, fails for all later ones.
@@ -60,7 +71,11 @@ std::size_t PlaceIndex::old_enough(FrameId frame, double stamp_s) const {
   });
 }
 
-bool PlaceIndex::has_searchable_past(FrameId frame, double stamp_s) const { return old_enough(frame, stamp_s) > 0; }
+std::optional<FrameId> PlaceIndex::newest_searchable(FrameId frame, double stamp_s) const {
+  const std::size_t places = old_enough(frame, stamp_s);
+  if (places == 0) return std::nullopt;
+  return store_->frame(places - 1);
+}
 
 Result<std::vector<LoopCandidate>> PlaceIndex::search(FrameId frame, double stamp_s, const IntensityScanContext& query,
                                                       int threads, SearchEffort* effort) const {
@@ -74,13 +89,14 @@ Result<std::vector<LoopCandidate>> PlaceIndex::search_all(const IntensityScanCon
 
 Result<std::vector<LoopCandidate>> PlaceIndex::rank(std::size_t places, const IntensityScanContext& query, int threads,
                                                     SearchEffort* effort) const {
-  if (places > 0 && (query.rings != store_->rings() || query.sectors != store_->sectors()))
+  if (places > 0 &&
+      (query.rings != store_->rings() || query.sectors != store_->sectors() || query.levels != store_->levels()))
     throw std::invalid_argument("descriptors of different grids cannot be compared");
   const auto shortlist = options_.shortlist == 0 ? places : static_cast<std::size_t>(options_.shortlist);
   retrieval_internal::SearchCounts counts;
-  const auto nearest = retrieval_internal::nearest_images(*store_, places, query.occupancy.data(), shortlist,
-                                                          farthest_distance(options_.min_geometry_score, query.cells()),
-                                                          threads, &counts);
+  const auto nearest =
+      retrieval_internal::nearest_images(*store_, places, query.occupancy.data(), shortlist,
+                                         farthest_distance(options_.min_geometry_score, query), threads, &counts);
   if (!nearest) return nearest.error();
   if (effort != nullptr) *effort = {counts.places, counts.compared};
 
@@ -89,19 +105,23 @@ Result<std::vector<LoopCandidate>> PlaceIndex::rank(std::size_t places, const In
   for (const auto& each : *nearest) {
     LoopCandidate candidate;
     candidate.match = store_->frame(each.place);
-    candidate.geometry_score = geometry_score(each.distance, query.cells());
     candidate.shift_columns = static_cast<int>(each.shift);
     candidate.yaw_rad = yaw_of_shift(candidate.shift_columns, query.sectors);
     const auto descriptor = store_->descriptor(each.place);
     if (!descriptor) return store_->damage(each.place);
+    candidate.geometry_score = geometry_score(query, *descriptor, each.distance);
     candidate.intensity_score = match_intensity(query, *descriptor, candidate.shift_columns);
-    if (candidate.intensity_score >= options_.min_intensity_score) candidates.push_back(candidate);
+    if (candidate.geometry_score >= options_.min_geometry_score &&
+        candidate.intensity_score >= options_.min_intensity_score)
+      candidates.push_back(candidate);
   }
-  std::sort(candidates.begin(), candidates.end(), [](const LoopCandidate& a, const LoopCandidate& b) {
-    return a.score() != b.score() ? a.score() > b.score() : a.match < b.match;
+  const auto rank = [&](const LoopCandidate& each) {
+    return each.geometry_score + options_.intensity_weight * each.intensity_score;
+  };
+  std::sort(candidates.begin(), candidates.end(), [&](const LoopCandidate& a, const LoopCandidate& b) {
+    return rank(a) != rank(b) ? rank(a) > rank(b) : a.match < b.match;
   });
-  candidates.resize(std::min(candidates.size(), static_cast<std::size_t>(options_.top_k)));
-  return candidates;
+  return best_apart(candidates, static_cast<std::size_t>(options_.top_k), options_.separation_frames);
 }
 
 std::optional<DescriptorView> PlaceIndex::find(FrameId frame) const {

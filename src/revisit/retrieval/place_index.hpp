@@ -50,8 +50,8 @@ class PlaceIndex {
   Result<std::vector<LoopCandidate>> search_all(const IntensityScanContext& query, int threads = 1,
                                                 SearchEffort* effort = nullptr) const;
 
-  /// Whether any place is old enough for a query at this frame and time.
-  bool has_searchable_past(FrameId frame, double stamp_s) const;
+  /// The newest place that is old enough for a query at this frame and time, if there is any.
+  std::optional<FrameId> newest_searchable(FrameId frame, double stamp_s) const;
 
   /// The descriptor of a frame, valid as long as the index. None where the file it lies in was altered.
   std::optional<DescriptorView> find(FrameId frame) const;

@@ -23,6 +23,7 @@ PlaceIndex filled(const RetrievalOptions& options, int places) {
 
 TEST(PlaceIndex, ExcludesTheRecentPastByFramesAndByTime) {
   RetrievalOptions options;
+  options.separation_frames = 0;
   options.exclude_frames = 50;
   options.exclude_s = 8.0;
   options.top_k = 1000;
@@ -30,15 +31,16 @@ TEST(PlaceIndex, ExcludesTheRecentPastByFramesAndByTime) {
   const PlaceIndex index = filled(options, 200);
   const auto latest = [&](int frame, double stamp_s) {
     std::int64_t last = -1;
-    for (const auto& each : *index.search(FrameId{frame}, stamp_s, random_context(7)))
-      last = std::max(last, each.match.value);
+    const auto found = index.search(FrameId{frame}, stamp_s, random_context(7));
+    for (const auto& each : *found) last = std::max(last, each.match.value);
     return last;
   };
   EXPECT_EQ(latest(200, 20.0), 120) << "8 s are 80 frames here";
   EXPECT_EQ(latest(200, 100.0), 150) << "50 frames";
   EXPECT_EQ(latest(79, 7.9), -1);
-  EXPECT_FALSE(index.has_searchable_past(FrameId{79}, 7.9));
-  EXPECT_TRUE(index.has_searchable_past(FrameId{80}, 8.0));
+  EXPECT_FALSE(index.newest_searchable(FrameId{79}, 7.9));
+  ASSERT_TRUE(index.newest_searchable(FrameId{85}, 8.5));
+  EXPECT_EQ(index.newest_searchable(FrameId{85}, 8.5)->value, 5);
 }
 
 TEST(PlaceIndex, TheFirstPlaceCanBeFound) {
@@ -53,6 +55,8 @@ TEST(PlaceIndex, RanksAsComparingAllByHand) {
   RetrievalOptions options;
   options.shortlist = 0;
   options.top_k = 10;
+  options.separation_frames = 0;
+  options.intensity_weight = 1.0;
   const PlaceIndex index = filled(options, 120);
   const IntensityScanContext query = random_context(1000);
   std::vector<std::pair<double, std::int64_t>> by_hand;
@@ -67,9 +71,30 @@ TEST(PlaceIndex, RanksAsComparingAllByHand) {
   }
 }
 
+TEST(PlaceIndex, OfPlacesFewFramesApartTheBestIsReturned) {
+  RetrievalOptions options;
+  options.shortlist = 0;
+  options.top_k = 1000;
+  options.separation_frames = 0;
+  const auto all = filled(options, 100).search_all(random_context(5));
+  options.separation_frames = 8;
+  const auto apart = filled(options, 100).search_all(random_context(5));
+  EXPECT_EQ((*apart)[0].match, (*all)[0].match);
+  EXPECT_GE(apart->size(), 6u);
+  for (std::size_t i = 0; i < apart->size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) EXPECT_GT(std::abs((*apart)[i].match.value - (*apart)[j].match.value), 8);
+  // Whatever is left out is near one that is better.
+  for (std::size_t i = 0; i < all->size(); ++i) {
+    bool is_near = false;
+    for (const auto& kept : *apart) is_near = is_near || std::abs(kept.match.value - (*all)[i].match.value) <= 8;
+    EXPECT_TRUE(is_near);
+  }
+}
+
 TEST(PlaceIndex, GatesAndShortlistAreKept) {
   RetrievalOptions options;
   options.top_k = 1000;
+  options.separation_frames = 0;
   options.shortlist = 7;
   EXPECT_EQ(filled(options, 100).search_all(random_context(5))->size(), 7u);
   options.shortlist = 0;

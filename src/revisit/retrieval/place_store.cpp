@@ -8,10 +8,11 @@
 
 namespace revisit::retrieval_internal {
 
-ChunkLayout::ChunkLayout(int rings, int sectors)
+ChunkLayout::ChunkLayout(int rings, int sectors, int levels)
     : cells(static_cast<std::size_t>(rings) * static_cast<std::size_t>(sectors)),
-      words(revisit_bits_words(static_cast<std::uint32_t>(cells))),
-      place(revisit_bits_place_bytes(static_cast<std::uint32_t>(rings), static_cast<std::uint32_t>(sectors))) {
+      words(revisit_bits_words(static_cast<std::uint32_t>(cells) * static_cast<std::uint32_t>(std::max(1, levels)))),
+      place(revisit_bits_place_bytes(static_cast<std::uint32_t>(rings * std::max(1, levels)),
+                                     static_cast<std::uint32_t>(sectors))) {
   constexpr std::size_t kBytesOfBounds =
       REVISIT_BITS_COLUMNS + sizeof(std::uint32_t) + sizeof(std::int64_t) + sizeof(double);
   begin[kImages] = kPlaces * kBytesOfBounds;  // whole pages, for 4,096 places
@@ -43,13 +44,14 @@ void PlaceStore::add(FrameId frame, double stamp_s, const IntensityScanContext& 
   if (i > 0 && frame <= this->frame(i - 1))
     throw std::invalid_argument("frame " + std::to_string(frame.value) + " after frame " +
                                 std::to_string(this->frame(i - 1).value) + ": frames must increase");
-  if (i > 0 && (descriptor.rings != rings_ || descriptor.sectors != sectors_))
+  if (i > 0 && (descriptor.rings != rings_ || descriptor.sectors != sectors_ || descriptor.levels != levels_))
     throw std::invalid_argument("descriptors of one index must have one grid");
   if (i / kChunk >= kMostChunks) throw std::length_error("an index holds up to 268 million places");
   if (i == 0) {
     rings_ = descriptor.rings;
     sectors_ = descriptor.sectors;
-    layout_ = {rings_, sectors_};
+    levels_ = descriptor.levels;
+    layout_ = {rings_, sectors_, levels_};
   }
   Chunk& chunk =
       i % kChunk == 0 ? append_chunk(i / kChunk, nullptr) : *chunks_[i / kChunk].load(std::memory_order_relaxed);
@@ -63,8 +65,7 @@ void PlaceStore::add(FrameId frame, double stamp_s, const IntensityScanContext& 
   auto* const place =
       reinterpret_cast<revisit_bits_place*>(data + layout_.begin[ChunkLayout::kImages] + at * layout_.place);
   std::uint8_t columns[REVISIT_BITS_COLUMNS];
-  revisit_bits_make_place(descriptor.occupancy.data(), static_cast<std::uint32_t>(rings_),
-                          static_cast<std::uint32_t>(sectors_), place, columns);
+  revisit_bits_make_place(descriptor.occupancy.data(), rows(), static_cast<std::uint32_t>(sectors_), place, columns);
   for (std::size_t column = 0; column < REVISIT_BITS_COLUMNS; ++column)
     data[(at / REVISIT_BITS_BLOCK * REVISIT_BITS_COLUMNS + column) * REVISIT_BITS_BLOCK + at % REVISIT_BITS_BLOCK] =
         columns[column];
@@ -80,7 +81,7 @@ std::optional<DescriptorView> PlaceStore::descriptor(std::size_t i) const {
   const revisit_bits_place* const found = place(i);
   const Chunk& c = chunk(i);
   if (found == nullptr || !is_intact(c, ChunkLayout::kIntensities)) return std::nullopt;
-  return DescriptorView(rings_, sectors_, c.part(ChunkLayout::kIntensities) + i % kChunk * layout_.cells,
+  return DescriptorView(rings_, sectors_, levels_, c.part(ChunkLayout::kIntensities) + i % kChunk * layout_.cells,
                         image_of(found));
 }
 

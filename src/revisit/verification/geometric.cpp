@@ -21,6 +21,9 @@ std::string reason_to_refuse(const GeometricEvidence& evidence, bool converged, 
   const double translation_m = evidence.T_match_query.translation().norm();
   if (evidence.inlier_ratio < options.min_inlier_ratio)
     return format("inlier ratio %.2f below %.2f", evidence.inlier_ratio, options.min_inlier_ratio);
+  if (evidence.free_space_agreement < options.min_free_space_agreement)
+    return format("the scans see through each other: agreement %.2f below %.2f", evidence.free_space_agreement,
+                  options.min_free_space_agreement);
   if (!converged) return "registration did not converge";
   if (translation_m > options.max_translation_m)
     return format("translation %.1f m above %.1f m", translation_m, options.max_translation_m);
@@ -29,12 +32,13 @@ std::string reason_to_refuse(const GeometricEvidence& evidence, bool converged, 
 
 GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& query, const Pose& T_guess_match_query,
                                 const GeometricOptions& options) {
-  const IcpResult icp = align_icp(match, query, T_guess_match_query);
+  const IcpResult icp = align_icp(match, query, T_guess_match_query, options.overhead_search ? 2.0 : 4.0);
   const Agreement agreement = measure_agreement(match, query, icp.T_target_source, options.inlier_distance_m);
   GeometricEvidence evidence;
   evidence.T_match_query = icp.T_target_source;
   evidence.icp_iterations = icp.iterations;
   evidence.inlier_ratio = agreement.inlier_ratio;
+  evidence.free_space_agreement = agreement.free_space_agreement;
   evidence.rmse_m = agreement.rmse_m;
   evidence.reason = reason_to_refuse(evidence, icp.converged, options);
   evidence.consistent = evidence.reason.empty();
@@ -43,7 +47,7 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
 
 }  // namespace
 
-GeometricEvidence check_geometric(ScanGeometry& match, ScanGeometry& query, double yaw_rad,
+GeometricEvidence check_geometric(ScanGeometry& match, ScanGeometry& query, const Pose& T_guess_match_query,
                                   const GeometricOptions& options) {
   std::optional<GeometricEvidence> best;
   const auto consider = [&](GeometricEvidence evidence, const std::optional<FeatureAlignment>& features) {
@@ -62,9 +66,7 @@ GeometricEvidence check_geometric(ScanGeometry& match, ScanGeometry& query, doub
       if (!features) continue;
       consider(register_from(match.surface(), query.surface(), features->T_target_source, options), features);
     } else {
-      Pose T_yaw = Pose::Identity();
-      T_yaw.linear() = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-      consider(register_from(match.surface(), query.surface(), T_yaw, options), std::nullopt);
+      consider(register_from(match.surface(), query.surface(), T_guess_match_query, options), std::nullopt);
     }
     if (best->consistent) break;
   }

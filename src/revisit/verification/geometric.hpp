@@ -13,6 +13,7 @@ namespace revisit {
 struct GeometricEvidence {
   Pose T_match_query = Pose::Identity();  ///< best registration found, accepted or not
   double inlier_ratio = 0.0;              ///< smaller of both directions
+  double free_space_agreement = 0.0;      ///< smaller of both directions
   double rmse_m = 0.0;
   int icp_iterations = 0;
   std::size_t feature_matches = 0, feature_inliers = 0;  ///< FPFH; 0 where it found no transform
@@ -21,10 +22,11 @@ struct GeometricEvidence {
   std::string reason;  ///< why not consistent
 };
 
-/// Geometric consistency (paper, section III-D): registers the query onto the match by ICP, from the yaw that the
-/// descriptors agreed on; with features_fallback, from FPFH's transform where that is not consistent; with
-/// features_first, the other way round. Judges the better of both. Deterministic; one thread a scan.
-GeometricEvidence check_geometric(ScanGeometry& match, ScanGeometry& query, double yaw_rad,
+/// Geometric consistency (paper, section III-D): registers the query onto the match by ICP, from a guess (the
+/// yaw that the descriptors agreed on, or what the overhead search found); with features_fallback, from FPFH's
+/// transform where that is not consistent; with features_first, the other way round. Judges the better of both.
+/// Deterministic; one thread a scan.
+GeometricEvidence check_geometric(ScanGeometry& match, ScanGeometry& query, const Pose& T_guess_match_query,
                                   const GeometricOptions& options);
 
 }  // namespace revisit

@@ -23,7 +23,7 @@ struct ChunkLayout {
   enum Part : std::uint8_t { kBounds, kImages, kIntensities, kParts };
 
   ChunkLayout() = default;
-  ChunkLayout(int rings, int sectors);
+  ChunkLayout(int rings, int sectors, int levels);
 
   std::size_t cells = 0, words = 0;
   std::size_t place = 0;               ///< bytes of a revisit_bits_place
@@ -57,6 +57,8 @@ class PlaceStore {
   std::size_t size() const { return size_.load(std::memory_order_acquire); }
   int rings() const { return rings_; }
   int sectors() const { return sectors_; }
+  int levels() const { return levels_; }
+  std::uint32_t rows() const { return static_cast<std::uint32_t>(rings_ * std::max(1, levels_)); }  ///< of an image
 
   // Of a place below size().
   FrameId frame(std::size_t i) const { return FrameId{chunk(i).frames()[i % kChunk]}; }
@@ -108,7 +110,7 @@ class PlaceStore {
 
   std::unique_ptr<std::atomic<Chunk*>[]> chunks_;
   std::atomic<std::size_t> size_ = 0;
-  int rings_ = 0, sectors_ = 0;  // set before the first place is published
+  int rings_ = 0, sectors_ = 0, levels_ = 0;  // set before the first place is published
   ChunkLayout layout_;
   std::string path_;
   MappedFile file_;

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/registration/overhead_search.hpp>
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "synthetic_world.hpp"
+
+namespace revisit {
+namespace {
+
+using testing_support::SyntheticWorld;
+
+ThinCloud thin_scan(const SyntheticWorld& world, const Pose& T_world_lidar, unsigned seed) {
+  const Scan scan = world.scan(T_world_lidar, {32, 900, -24.8, 5.0}, seed);
+  std::vector<std::uint8_t> ground;
+  for (const Point& p : scan.points) ground.push_back(p.z < -1.4f);
+  return thin(scan.points, ground, 1.0);
+}
+
+TEST(OverheadSearch, FindsPositionAndHeading) {
+  const SyntheticWorld world(31);
+  const Pose T_a = SyntheticWorld::at(0, 0, 0);
+  const ThinCloud a = thin_scan(world, T_a, 1);
+  for (const auto& [x, y, yaw_deg] : {std::tuple{0.0, 0.0, 0.0}, {4.0, -3.0, 8.0}, {-5.0, 2.0, 175.0}}) {
+    const Pose T_b = SyntheticWorld::at(x, y, to_radians(yaw_deg));
+    const ThinCloud b = thin_scan(world, T_b, 2);
+    OverheadSearch search(b);
+    // From a heading 7 degrees off.
+    const OverheadMatch found = search.search(a, to_radians(yaw_deg - 7.0), to_radians(9.0), 6);
+    const Pose T_truth = T_a.inverse() * T_b;
+    const Pose T_error = T_truth.inverse() * planar_pose(found.x_m, found.y_m, found.yaw_rad);
+    EXPECT_LT(T_error.translation().head<2>().norm(), 1.5) << yaw_deg;
+    EXPECT_LT(to_degrees(rotation_angle(T_error)), 3.1);
+    EXPECT_GT(found.overlap, 0.6);
+  }
+}
+
+TEST(OverheadSearch, AnotherPlaceOverlapsLess) {
+  const Pose T = SyntheticWorld::at(0, 0, 0);
+  const ThinCloud a = thin_scan(SyntheticWorld(31), T, 1), other = thin_scan(SyntheticWorld(32), T, 2);
+  OverheadSearch search(a);
+  EXPECT_GT(search.search(a, 0.0, 0.1, 3).overlap, 0.99);
+  EXPECT_LT(search.search(other, 0.0, to_radians(9.0), 6).overlap, 0.6);
+}
+
+TEST(OverheadSearch, OfNothingFindsNothing) {
+  const ThinCloud nothing;
+  const ThinCloud a = thin_scan(SyntheticWorld(31), SyntheticWorld::at(0, 0, 0), 1);
+  OverheadSearch of_nothing(nothing), of_a(a);
+  EXPECT_EQ(of_nothing.search(a, 0.0, 0.1, 3).overlap, 0.0);
+  EXPECT_EQ(of_a.search(nothing, 0.3, 0.1, 3).overlap, 0.0);
+  EXPECT_EQ(overhead_image(nothing).count, 0u);
+}
+
+}  // namespace
+}  // namespace revisit

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/registration/seen_space.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include <revisit/core/pose.hpp>
+
+namespace revisit {
+namespace {
+
+constexpr int kAzimuths = 120, kElevations = 30;
+constexpr auto kCellsARad = static_cast<float>(kAzimuths / (2.0 * kPi));
+
+std::optional<std::size_t> cell_of(float x, float y, float z) {
+  const float rho = std::hypot(x, y);
+  const float elevation = std::atan2(z, rho) * kCellsARad + kElevations / 2.f;
+  if (!(elevation >= 0.f && elevation < kElevations)) return std::nullopt;
+  const float azimuth = (std::atan2(y, x) + static_cast<float>(kPi)) * kCellsARad;
+  const int column = static_cast<int>(azimuth) % kAzimuths;
+  return static_cast<std::size_t>(column * kElevations + static_cast<int>(elevation));
+}
+
+}  // namespace
+
+SeenSpace::SeenSpace(std::span<const Point> points) : cells_(std::size_t{kAzimuths} * kElevations) {
+  for (const Point& p : points) {
+    const auto cell = cell_of(p.x, p.y, p.z);
+    if (!cell) continue;
+    const float range_cm = 100.f * std::sqrt(p.x * p.x + p.y * p.y + p.z * p.z);
+    const auto range = static_cast<std::uint16_t>(std::min(range_cm, 65534.f));
+    Interval& interval = cells_[*cell];
+    interval.nearest_cm = std::min(interval.nearest_cm, range);
+    interval.farthest_cm = std::max(interval.farthest_cm, range);
+  }
+}
+
+SeenSpace::Verdict SeenSpace::look(const Eigen::Vector3f& p, float margin_m) const {
+  const auto cell = cells_.empty() ? std::nullopt : cell_of(p.x(), p.y(), p.z());
+  if (!cell || cells_[*cell].farthest_cm == 0) return Verdict::kUnknown;
+  const float range_m = p.norm();
+  if (range_m < 0.01f * cells_[*cell].nearest_cm - margin_m) return Verdict::kThrough;
+  if (range_m > 0.01f * cells_[*cell].farthest_cm + margin_m) return Verdict::kHidden;
+  return Verdict::kSurface;
+}
+
+}  // namespace revisit

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <revisit/core/scan.hpp>
+
+namespace revisit {
+
+/// How far a scan saw in each direction: cells of 3 x 3 degrees, from 45 degrees below to 45 above. Tells whether a point
+/// of another scan stands where this one saw through, or where it could not see.
+class SeenSpace {
+ public:
+  enum class Verdict : std::uint8_t {
+    kUnknown,   ///< nothing came back from that direction
+    kThrough,   ///< everything seen there lies beyond: nothing stood at the point
+    kSurface,   ///< something was seen at about that range
+    kHidden     ///< the point lies behind all that was seen there
+  };
+
+  SeenSpace() = default;
+  explicit SeenSpace(std::span<const Point> points);
+
+  /// `p` in the scan's frame; `margin_m` is what the ranges may be off.
+  Verdict look(const Eigen::Vector3f& p, float margin_m) const;
+
+ private:
+  struct Interval {
+    std::uint16_t nearest_cm = UINT16_MAX, farthest_cm = 0;
+  };
+  std::vector<Interval> cells_;  ///< [azimuth][elevation]; empty: nothing was seen
+};
+
+}  // namespace revisit
