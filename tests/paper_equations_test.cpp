@@ -143,7 +143,7 @@ TEST(PaperEquations, TemporalConsistencyIsThePrintedMean) {
   std::map<FrameId, PageDescriptor> page;
   for (int frame = 0; frame < 30; ++frame) {
     const auto points = random_points(400, static_cast<unsigned>(frame % 11));
-    past[FrameId{frame}] = describe(points, {});
+    past[FrameId{frame}] = describe(points, preset("paper")->descriptor);
     page[FrameId{frame}] = describe_by_the_page(points, 60, 20, 50.0);
   }
   const DescriptorLookup lookup = [&](FrameId frame) {

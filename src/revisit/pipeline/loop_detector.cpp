@@ -32,7 +32,7 @@ LoopDetector::LoopDetector(const Parameters& parameters, std::optional<Intensity
 }
 
 Result<Detection> LoopDetector::process(Scan scan, const std::optional<Pose>& T_world_lidar) {
-  auto prepared = prepare(std::move(scan));
+  auto prepared = prepare_next(std::move(scan));
   if (!prepared) return prepared.error();
   auto detection = detect(*prepared, T_world_lidar, Past::kOldEnough);
   if (!detection) return detection.error();
@@ -50,7 +50,7 @@ double LoopDetector::Opinion::score() const {
 }
 
 Status LoopDetector::add(Scan scan, const std::optional<Pose>& T_world_lidar) {
-  auto prepared = prepare(std::move(scan));
+  auto prepared = prepare_next(std::move(scan));
   if (!prepared) return prepared.error();
   remember(*std::move(prepared), T_world_lidar);
   return ok();
@@ -62,12 +62,24 @@ Result<Detection> LoopDetector::localise(Scan scan) {
   return detect(*prepared, std::nullopt, Past::kAll);
 }
 
-Result<PreparedScan> LoopDetector::prepare(Scan scan) {
+Result<PreparedScan> LoopDetector::prepare_next(Scan scan) {
+  // Without times nothing can be undone, and the motion is not asked for.
+  if (scan.times_s.empty()) return prepare(std::move(scan));
+  const std::optional<Twist> motion = ego_motion_.expected(scan.stamp_s);
+  auto prepared = prepare(std::move(scan), motion);
+  if (prepared) {
+    prepared->geometry = std::make_shared<ScanGeometry>(prepared->cloud);
+    ego_motion_.learn(prepared->scan.stamp_s, prepared->geometry);
+  }
+  return prepared;
+}
+
+Result<PreparedScan> LoopDetector::prepare(Scan scan, const std::optional<Twist>& motion) {
   if (!scale_) {
     scale_ = estimate_intensity_scale(std::span<const Scan>(&scan, 1), parameters_.intensity);
     if (!scale_->warning.empty()) log_to(log_, LogLevel::kWarning, scale_->warning);
   }
-  auto prepared = prepare_scan(std::move(scan), parameters_, *scale_, calibration_);
+  auto prepared = prepare_scan(std::move(scan), parameters_, *scale_, calibration_, motion);
   if (prepared && !rings_were_reported_) {
     rings_were_reported_ = true;
     const std::size_t known = calibration_.ring_gains.size(), seen = prepared->ground.ring_count;
@@ -135,9 +147,9 @@ void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
   detection.temporal_ms += watch.lap_ms();
 
   // Each candidate is registered on its own; who finishes first does not matter.
-  std::optional<ScanGeometry> query;
-  if (std::any_of(opinions.begin(), opinions.end(), [](const Opinion& o) { return o.reason.empty(); }))
-    query.emplace(prepared.cloud);
+  std::shared_ptr<const ScanGeometry> query = prepared.geometry;
+  if (!query && std::any_of(opinions.begin(), opinions.end(), [](const Opinion& o) { return o.reason.empty(); }))
+    query = std::make_shared<ScanGeometry>(prepared.cloud);
   const auto register_one = [&](Opinion& each) {
     ScanGeometry match(places_.at(each.candidate.match).cloud);
     each.geometric = check_geometric(match, *query, each.T_guess_match_query, parameters_.geometric);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <revisit/core/results.hpp>
+#include <revisit/pipeline/ego_motion.hpp>
 #include <revisit/pipeline/prepare.hpp>
 #include <revisit/registration/overhead_search.hpp>
 #include <revisit/retrieval/place_index.hpp>
@@ -65,7 +66,9 @@ class LoopDetector {
   };
   enum class Past { kOldEnough, kAll };
 
-  Result<PreparedScan> prepare(Scan scan);
+  Result<PreparedScan> prepare(Scan scan, const std::optional<Twist>& motion = std::nullopt);
+  // The next scan of the recording: its distortion is undone, and the motion learnt from it.
+  Result<PreparedScan> prepare_next(Scan scan);
   Result<Detection> detect(const PreparedScan& prepared, const std::optional<Pose>& T_world_lidar, Past past);
   // What is found out about a candidate, step by step; `reason` says why it is no loop.
   struct Opinion {
@@ -96,6 +99,7 @@ class LoopDetector {
   bool rings_were_reported_ = false;
   PlaceIndex index_;
   std::map<FrameId, Place> places_;
+  EgoMotion ego_motion_;
   std::deque<std::pair<FrameId, IntensityScanContext>> recent_queries_;  ///< the last N, for temporal consistency
 };
 

@@ -6,6 +6,7 @@
 
 #include <revisit/preprocess/range_filter.hpp>
 #include <revisit/preprocess/rings.hpp>
+#include <revisit/preprocess/undistort.hpp>
 
 namespace revisit {
 namespace {
@@ -51,7 +52,7 @@ double ground_below_sensor_m(std::span<const Point> points, std::span<const std:
 }  // namespace
 
 Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const IntensityScale& scale,
-                                  const IntensityCalibration& calibration) {
+                                  const IntensityCalibration& calibration, const std::optional<Twist>& motion) {
   require_consistent(scan);
   PreparedScan prepared;
   prepared.scan = std::move(scan);
@@ -67,6 +68,7 @@ Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const
   const bool rings_fit = rings.count() == calibration.ring_gains.size();
   normalise_intensity(prepared.scan, scale, calibration,
                       rings_fit ? std::span<const std::uint16_t>(rings.of_point) : std::span<const std::uint16_t>());
+  if (motion) undistort(prepared.scan, *motion);
   prepared.ms.intensity = watch.lap_ms();
 
   prepared.ground_z_m = ground_below_sensor_m(prepared.scan.points, prepared.ground.is_ground);

@@ -2,17 +2,20 @@
 #pragma once
 
 #include <functional>
+#include <memory>
+#include <optional>
 
 #include <revisit/config/parameters.hpp>
 #include <revisit/core/intensity_calibration.hpp>
 #include <revisit/core/log.hpp>
 #include <revisit/core/result.hpp>
 #include <revisit/core/scan.hpp>
+#include <revisit/core/twist.hpp>
 #include <revisit/descriptors/intensity_scan_context.hpp>
 #include <revisit/io/recording.hpp>
 #include <revisit/preprocess/ground.hpp>
 #include <revisit/preprocess/intensity.hpp>
-#include <revisit/registration/surface_cloud.hpp>
+#include <revisit/registration/feature_alignment.hpp>
 
 namespace revisit {
 
@@ -23,15 +26,18 @@ struct PreparedScan {
   IntensityScanContext descriptor;
   double ground_z_m = 0.0;  ///< where the ground below the sensor lies, in its frame
   ThinCloud cloud;          ///< for registration; the ground is kept and marked
+  std::shared_ptr<const ScanGeometry> geometry;  ///< of the cloud, where somebody has asked for it already
 
   struct Milliseconds {
     double filter = 0.0, ground = 0.0, intensity = 0.0, describe = 0.0, thin = 0.0;
   } ms;
 };
 
-/// The paper's sections III-A and III-B in order. An error says why the scan describes no place.
+/// The paper's sections III-A and III-B in order; with the sensor's `motion`, the distortion of the sweep is undone
+/// after the ground is found. An error says why the scan describes no place.
 Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const IntensityScale& scale,
-                                  const IntensityCalibration& calibration = {});
+                                  const IntensityCalibration& calibration = {},
+                                  const std::optional<Twist>& motion = std::nullopt);
 
 /// The intensity scale of a recording, from up to ten readable scans spread over it.
 /// An error where none of them is readable: the first one's.

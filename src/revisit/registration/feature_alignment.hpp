@@ -40,14 +40,14 @@ class ScanGeometry {
   explicit ScanGeometry(ThinCloud cloud) : surface_(std::move(cloud)) {}
   const SurfaceCloud& surface() const { return surface_; }
   /// Computed on the first call, with that call's radius.
-  const Features& features(double radius_m) {
+  const Features& features(double radius_m) const {
     std::call_once(*once_, [&] { features_ = compute_features(surface_, radius_m); });
     return features_;
   }
 
  private:
   SurfaceCloud surface_;
-  Features features_;
+  mutable Features features_;
   std::unique_ptr<std::once_flag> once_ = std::make_unique<std::once_flag>();
 };
 

@@ -47,7 +47,7 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
 
 }  // namespace
 
-GeometricEvidence check_geometric(ScanGeometry& match, ScanGeometry& query, const Pose& T_guess_match_query,
+GeometricEvidence check_geometric(const ScanGeometry& match, const ScanGeometry& query, const Pose& T_guess_match_query,
                                   const GeometricOptions& options) {
   std::optional<GeometricEvidence> best;
   const auto consider = [&](GeometricEvidence evidence, const std::optional<FeatureAlignment>& features) {

@@ -26,7 +26,7 @@ struct GeometricEvidence {
 /// yaw that the descriptors agreed on, or what the overhead search found); with features_fallback, from FPFH's
 /// transform where that is not consistent; with features_first, the other way round. Judges the better of both.
 /// Deterministic; one thread a scan.
-GeometricEvidence check_geometric(ScanGeometry& match, ScanGeometry& query, const Pose& T_guess_match_query,
+GeometricEvidence check_geometric(const ScanGeometry& match, const ScanGeometry& query, const Pose& T_guess_match_query,
                                   const GeometricOptions& options);
 
 }  // namespace revisit

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/preprocess/undistort.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace revisit {
+
+void undistort(Scan& scan, const Twist& motion) {
+  if (scan.times_s.size() != scan.points.size() || scan.points.empty()) return;
+  const auto [first, last] = std::minmax_element(scan.times_s.begin(), scan.times_s.end());
+  if (!std::isfinite(*first) || !std::isfinite(*last) || *last - *first > 1.f) return;  // no sweep lasts that long
+  // Poses at a thousand moments of the sweep: a car moves 3 mm from one to the next.
+  constexpr int kMoments = 1000;
+  const float step_s = std::max(1e-9f, (*last - *first) / kMoments);
+  std::vector<Eigen::Isometry3f> T_stamp_moment(kMoments + 1);
+  for (int i = 0; i <= kMoments; ++i)
+    T_stamp_moment[static_cast<std::size_t>(i)] =
+        motion_after(motion, static_cast<double>(*first + (static_cast<float>(i) + 0.5f) * step_s)).cast<float>();
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const auto moment = static_cast<std::size_t>((scan.times_s[i] - *first) / step_s);
+    Point& p = scan.points[i];
+    const Eigen::Vector3f q =
+        T_stamp_moment[std::min<std::size_t>(moment, kMoments)] * Eigen::Vector3f(p.x, p.y, p.z);
+    p.x = q.x();
+    p.y = q.y();
+    p.z = q.z();
+  }
+}
+
+}  // namespace revisit
