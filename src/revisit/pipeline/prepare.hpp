@@ -24,8 +24,8 @@ struct PreparedScan {
   Scan scan;
   GroundSegmentation ground;
   IntensityScanContext descriptor;
-  double ground_z_m = 0.0;  ///< where the ground below the sensor lies, in its frame
-  ThinCloud cloud;          ///< for registration; the ground is kept and marked
+  double ground_z_m = 0.0;                       ///< where the ground below the sensor lies, in its frame
+  ThinCloud cloud;                               ///< for registration; the ground is kept and marked
   std::shared_ptr<const ScanGeometry> geometry;  ///< of the cloud, where somebody has asked for it already
 
   struct Milliseconds {

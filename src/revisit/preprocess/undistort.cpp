@@ -21,8 +21,7 @@ void undistort(Scan& scan, const Twist& motion) {
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const auto moment = static_cast<std::size_t>((scan.times_s[i] - *first) / step_s);
     Point& p = scan.points[i];
-    const Eigen::Vector3f q =
-        T_stamp_moment[std::min<std::size_t>(moment, kMoments)] * Eigen::Vector3f(p.x, p.y, p.z);
+    const Eigen::Vector3f q = T_stamp_moment[std::min<std::size_t>(moment, kMoments)] * Eigen::Vector3f(p.x, p.y, p.z);
     p.x = q.x();
     p.y = q.y();
     p.z = q.z();

@@ -26,8 +26,8 @@ TEST(Undistort, PutsPointsWhereTheyAreSeenFromTheStamp) {
     const Eigen::Vector3d at_stamp(30.0 * std::cos(angle), 30.0 * std::sin(angle), 2.0);
     const Eigen::Vector3d seen = motion_after(motion, time_s).inverse() * at_stamp;
     still.points.push_back({static_cast<float>(at_stamp.x()), static_cast<float>(at_stamp.y()), 2.f, 0.5f});
-    distorted.points.push_back({static_cast<float>(seen.x()), static_cast<float>(seen.y()),
-                                static_cast<float>(seen.z()), 0.5f});
+    distorted.points.push_back(
+        {static_cast<float>(seen.x()), static_cast<float>(seen.y()), static_cast<float>(seen.z()), 0.5f});
     distorted.times_s.push_back(static_cast<float>(time_s));
   }
   Scan without_times = distorted;

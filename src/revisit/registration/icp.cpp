@@ -89,7 +89,19 @@ bool step(const SurfaceCloud& target, const SurfaceCloud& source, double width_m
   return true;
 }
 
+// Pearson's correlation of pairs.
+struct Correlation {
+  double n = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0;
+  void add(double a, double b) { n += 1.0, x += a, y += b, xx += a * a, yy += b * b, xy += a * b; }
+  double spread_x() const { return n * xx - x * x; }
+  double spread_y() const { return n * yy - y * y; }
+  // Intensities that are all alike tell nothing.
+  bool is_known() const { return n > 0 && spread_x() > 1e-6 * n * n && spread_y() > 1e-6 * n * n; }
+  double value() const { return (n * xy - x * y) / std::sqrt(spread_x() * spread_y()); }
+};
+
 struct DirectionalAgreement {
+  Correlation intensities;
   std::size_t visible = 0, inliers = 0, seen_through = 0;
   double squared_sum = 0.0;
 };
@@ -114,6 +126,8 @@ DirectionalAgreement agreement_one_way(const SurfaceCloud& to, const SurfaceClou
     }
     if (distance <= inlier_distance_m) {
       ++result.inliers;
+      result.intensities.add(static_cast<double>(from.intensity(i)),
+                             static_cast<double>(to.intensity(neighbour->index)));
       result.squared_sum += distance * distance;
     } else if (to.seen().look(p.cast<float>(), kSeenMargin_m) == SeenSpace::Verdict::kThrough) {
       ++result.seen_through;
@@ -171,6 +185,8 @@ Agreement measure_agreement(const SurfaceCloud& target, const SurfaceCloud& sour
     return known == 0 ? 0.0 : static_cast<double>(a.inliers) / static_cast<double>(known);
   };
   result.free_space_agreement = std::min(undisputed(forth), undisputed(back));
+  if (forth.intensities.is_known() && back.intensities.is_known())
+    result.intensity_correlation = std::min(forth.intensities.value(), back.intensities.value());
   const std::size_t inliers = forth.inliers + back.inliers;
   if (inliers > 0) result.rmse_m = std::sqrt((forth.squared_sum + back.squared_sum) / static_cast<double>(inliers));
   return result;

@@ -126,6 +126,62 @@ TEST(Icp, OfAScanWithItselfIsTheIdentity) {
   EXPECT_NEAR(agreement.rmse_m, 0.0, 1e-9);
 }
 
+TEST(Agreement, WallsThatTheOtherScanSawThroughCount) {
+  // The same room, once with a wall across it, which stands where the other scan saw the far side.
+  const auto room = [](bool with_wall) {
+    std::vector<Point> points;
+    for (int i = 0; i < 200; ++i)
+      for (int level = 0; level < 6; ++level) {
+        const auto along = 0.2f * static_cast<float>(i) - 20.f, z = 0.5f * static_cast<float>(level);
+        const float intensity = i % 20 < 10 ? 0.2f : 0.8f;
+        for (const float side : {-20.f, 20.f}) {
+          points.push_back({along, side, z, intensity});
+          if (!(with_wall && side > 0 && std::abs(along) < 10.f)) points.push_back({side, along, z, intensity});
+        }
+        if (with_wall && std::abs(along) < 5.f) points.push_back({10.f, along, z, intensity});
+      }
+    return SurfaceCloud(thin(points, {}, 1.0));
+  };
+  const SurfaceCloud open = room(false), walled = room(true);
+  const Agreement same = measure_agreement(open, open, Pose::Identity(), 0.4);
+  EXPECT_DOUBLE_EQ(same.free_space_agreement, 1.0);
+  ASSERT_TRUE(same.intensity_correlation);
+  EXPECT_NEAR(*same.intensity_correlation, 1.0, 1e-6);
+  const Agreement differing = measure_agreement(open, walled, Pose::Identity(), 0.4);
+  EXPECT_LT(differing.free_space_agreement, 0.97);
+  EXPECT_GT(differing.free_space_agreement, 0.8) << "what the wall hides is no dispute";
+}
+
+TEST(Agreement, IntensitiesAreComparedWhereThereAreAny) {
+  std::vector<Point> points, other, plain;
+  std::mt19937 random(3);
+  for (int i = 0; i < 60; ++i)
+    for (int j = 0; j < 60; ++j) {
+      const auto shade = [&] { return static_cast<float>(random() % 100) / 100.f; };
+      const Point p{static_cast<float>(i) - 29.5f, static_cast<float>(j) - 29.5f, 2.5f, shade()};
+      points.push_back(p);
+      other.push_back({p.x, p.y, p.z, shade()});
+      plain.push_back({p.x, p.y, p.z, 0.5f});
+    }
+  const SurfaceCloud a(thin(points, {}, 1.0)), b(thin(other, {}, 1.0)), c(thin(plain, {}, 1.0));
+  EXPECT_GT(measure_agreement(a, a, Pose::Identity(), 0.4).intensity_correlation.value_or(0.0), 0.99);
+  EXPECT_LT(std::abs(measure_agreement(a, b, Pose::Identity(), 0.4).intensity_correlation.value_or(1.0)), 0.1);
+  EXPECT_FALSE(measure_agreement(a, c, Pose::Identity(), 0.4).intensity_correlation) << "all alike";
+}
+
+TEST(SeenSpace, KnowsWhatLiesBeforeAndBehind) {
+  std::vector<Point> points;
+  for (int i = 0; i < 100; ++i) points.push_back({20.f, -1.f + 0.02f * static_cast<float>(i), 0.1f, 0.f});
+  const SeenSpace seen(points);
+  using Verdict = SeenSpace::Verdict;
+  EXPECT_EQ(seen.look({10.f, 0.2f, 0.1f}, 1.f), Verdict::kThrough);
+  EXPECT_EQ(seen.look({19.5f, 0.2f, 0.1f}, 1.f), Verdict::kSurface);
+  EXPECT_EQ(seen.look({30.f, 0.2f, 0.1f}, 1.f), Verdict::kHidden);
+  EXPECT_EQ(seen.look({-10.f, 0.2f, 0.1f}, 1.f), Verdict::kUnknown);
+  EXPECT_EQ(seen.look({0.f, 0.2f, 40.f}, 1.f), Verdict::kUnknown) << "above what is kept";
+  EXPECT_EQ(SeenSpace().look({10.f, 0.f, 0.f}, 1.f), Verdict::kUnknown);
+}
+
 TEST(Icp, TooLittleToAlignDoesNotConverge) {
   const SurfaceCloud a(thin_scan(SyntheticWorld::at(0, 0, 0)));
   const SurfaceCloud nothing(ThinCloud{}), one(thin(std::vector<Point>{{1, 2, 3, 0}}, {}, 1.0));

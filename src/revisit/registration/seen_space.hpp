@@ -11,15 +11,15 @@
 
 namespace revisit {
 
-/// How far a scan saw in each direction: cells of 3 x 3 degrees, from 45 degrees below to 45 above. Tells whether a point
-/// of another scan stands where this one saw through, or where it could not see.
+/// How far a scan saw in each direction: cells of 3 x 3 degrees, from 45 degrees below to 45 above. Tells whether a
+/// point of another scan stands where this one saw through, or where it could not see.
 class SeenSpace {
  public:
   enum class Verdict : std::uint8_t {
-    kUnknown,   ///< nothing came back from that direction
-    kThrough,   ///< everything seen there lies beyond: nothing stood at the point
-    kSurface,   ///< something was seen at about that range
-    kHidden     ///< the point lies behind all that was seen there
+    kUnknown,  ///< nothing came back from that direction
+    kThrough,  ///< everything seen there lies beyond: nothing stood at the point
+    kSurface,  ///< something was seen at about that range
+    kHidden    ///< the point lies behind all that was seen there
   };
 
   SeenSpace() = default;

@@ -34,6 +34,7 @@ struct SurfaceCloud::Grid : registration_internal::ColumnGrid {
 
 SurfaceCloud::SurfaceCloud(ThinCloud cloud) : cloud_(std::move(cloud)) {
   if (cloud_.is_ground.size() != cloud_.points.size()) cloud_.is_ground.assign(cloud_.points.size(), 0);
+  if (cloud_.intensity.size() != cloud_.points.size()) cloud_.intensity.assign(cloud_.points.size(), 0.f);
   grid_ = std::make_unique<Grid>(std::span<const Eigen::Vector3f>(cloud_.points), cloud_.voxel_m);
   normals_.reserve(cloud_.points.size());
   std::vector<Eigen::Vector3f> around;

@@ -20,6 +20,7 @@ struct ThinCloud {
   std::vector<Eigen::Vector3f> points;  ///< centroids of the voxels, metres, LiDAR frame; in an order that depends on
                                         ///< the points alone
   std::vector<std::uint8_t> is_ground;  ///< one a point: most of its voxel lay on the ground
+  std::vector<float> intensity;         ///< one a point: mean of its voxel, as far as the scan has been normalised
   float voxel_m = 1.f;
   SeenSpace seen;  ///< of the scan it was thinned from
 };
@@ -42,6 +43,7 @@ class SurfaceCloud {
   /// Unit normal, sign arbitrary; zero where fewer than five neighbours gave none.
   const Eigen::Vector3f& normal(std::size_t i) const { return normals_[i]; }
   bool is_ground(std::size_t i) const { return cloud_.is_ground[i] != 0; }
+  float intensity(std::size_t i) const { return cloud_.intensity[i]; }
   const SeenSpace& seen() const { return cloud_.seen; }
 
   struct Neighbour {

@@ -30,6 +30,7 @@ class Axis {
 
 struct Voxel {
   Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  float intensity = 0.f;
   std::uint32_t count = 0, ground = 0;
 };
 
@@ -69,6 +70,7 @@ ThinCloud thin(std::span<const Point> points, std::span<const std::uint8_t> is_g
       Voxel& voxel = column[height];
       if (voxel.count == 0) heights.push_back(height);
       voxel.sum += Eigen::Vector3f(p.x, p.y, p.z);
+      voxel.intensity += p.intensity;
       ++voxel.count;
       if (!is_ground.empty()) voxel.ground += is_ground[sorted[at]];
     }
@@ -76,6 +78,7 @@ ThinCloud thin(std::span<const Point> points, std::span<const std::uint8_t> is_g
     for (const std::size_t height : heights) {
       Voxel& voxel = column[height];
       cloud.points.push_back(voxel.sum / static_cast<float>(voxel.count));
+      cloud.intensity.push_back(voxel.intensity / static_cast<float>(voxel.count));
       cloud.is_ground.push_back(2 * voxel.ground > voxel.count);
       voxel = {};
     }

@@ -24,6 +24,9 @@ std::string reason_to_refuse(const GeometricEvidence& evidence, bool converged, 
   if (evidence.free_space_agreement < options.min_free_space_agreement)
     return format("the scans see through each other: agreement %.2f below %.2f", evidence.free_space_agreement,
                   options.min_free_space_agreement);
+  if (evidence.intensity_correlation && *evidence.intensity_correlation < options.min_intensity_correlation)
+    return format("intensities differ: correlation %.2f below %.2f", *evidence.intensity_correlation,
+                  options.min_intensity_correlation);
   if (!converged) return "registration did not converge";
   if (translation_m > options.max_translation_m)
     return format("translation %.1f m above %.1f m", translation_m, options.max_translation_m);
@@ -39,6 +42,7 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
   evidence.icp_iterations = icp.iterations;
   evidence.inlier_ratio = agreement.inlier_ratio;
   evidence.free_space_agreement = agreement.free_space_agreement;
+  evidence.intensity_correlation = agreement.intensity_correlation;
   evidence.rmse_m = agreement.rmse_m;
   evidence.reason = reason_to_refuse(evidence, icp.converged, options);
   evidence.consistent = evidence.reason.empty();

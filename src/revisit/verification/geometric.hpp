@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <revisit/config/parameters.hpp>
@@ -11,9 +12,10 @@ namespace revisit {
 
 /// What registration says about a candidate.
 struct GeometricEvidence {
-  Pose T_match_query = Pose::Identity();  ///< best registration found, accepted or not
-  double inlier_ratio = 0.0;              ///< smaller of both directions
-  double free_space_agreement = 0.0;      ///< smaller of both directions
+  Pose T_match_query = Pose::Identity();        ///< best registration found, accepted or not
+  double inlier_ratio = 0.0;                    ///< smaller of both directions
+  double free_space_agreement = 0.0;            ///< smaller of both directions
+  std::optional<double> intensity_correlation;  ///< none where intensities are all alike
   double rmse_m = 0.0;
   int icp_iterations = 0;
   std::size_t feature_matches = 0, feature_inliers = 0;  ///< FPFH; 0 where it found no transform
