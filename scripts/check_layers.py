@@ -33,7 +33,7 @@ DOORS = {
     "hwy/": {"src/revisit/bits", "src/revisit/descriptors"},
     "xxhash": {"src/revisit/retrieval"},
     "faiss/": {"benchmarks"},
-    "nanoflann": {"src/revisit/registration", "benchmarks"},
+    "nanoflann": {"benchmarks"},
     "toml++": {"src/revisit/config"},
     "nlohmann/": {"src/revisit/io", "src/revisit/config", "apps"},
     "embree": {"src/revisit/simulation"},

@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# Tables 1 and 2 (docs/evaluation.md) over simulated towns along recorded trajectories, at the shipped defaults.
+# usage: scripts/accuracy.sh POSES_FOLDER OUT [SEED] [SEQUENCE-SENSOR ...]
+# POSES_FOLDER holds kitti_NN.txt; sequences default to 00, 02, 05, 06, 07 and 08 with hdl64e and vlp16, and the
+# warehouse with vlp16. Choose nothing on the seeds that figures are reported for.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+poses=$(realpath "$1") out=$2 seed=${3:-41}
+shift $(($# < 3 ? $# : 3))
+if [ $# -eq 0 ]; then
+  set -- {00,02,05,06,07,08}-{hdl64e,vlp16} warehouse-vlp16
+fi
+mkdir -p "$out"
+for run in "$@"; do
+  sequence=${run%%-*} sensor=${run#*-} spec=$out/$run.toml
+  printf '[simulation]\nsensor = "%s"\nseed = %s\n' "$sensor" "$seed" > "$spec"
+  case $sequence in
+    warehouse) printf 'world = "warehouse"\n' >> "$spec" ;;
+    *) printf 'trajectory = "%s"\n' "$poses/kitti_$sequence.txt" >> "$spec" ;;
+  esac
+  echo "== $run, seed $seed"
+  build/revisit detect "$spec" --out "$out/$run" --overwrite
+  build/revisit evaluate "$out/$run" --reference "$spec" | tee "$out/$run.txt"
+done
