@@ -64,8 +64,8 @@ struct GeometricOptions {
   bool features_fallback = false;           ///< try FPFH where the descriptors' yaw gave no accepted registration; slow
   double feature_radius_m = 3.0;            ///< neighbourhood of FPFH features
   double inlier_distance_m = 0.4;           ///< farthest point-to-plane distance of an inlier
-  double min_inlier_ratio = 0.4;            ///< share of the points above ground, both ways, that must be inliers
-  double min_free_space_agreement = 0.85;   ///< inliers among these and points where the other scan saw through
+  double min_inlier_ratio = 0.45;           ///< share of the points above ground, both ways, that must be inliers
+  double min_free_space_agreement = 0.94;   ///< inliers among these and points where the other scan saw through
   double min_intensity_correlation = 0.45;  ///< of points that fit with those they lie on
   double max_translation_m = 15.0;          ///< a longer relative translation is refused
 };
