@@ -55,7 +55,7 @@ HWY_INLINE void LayPlacesOnTurns(const revisit_bits_query& query, const uint8_t*
   for (size_t v = 0; v < kVectors; ++v) {
     const size_t at = place + v * width;
     of_vector[v] =
-        counts + at / REVISIT_BITS_BLOCK * (REVISIT_BITS_COLUMNS * REVISIT_BITS_BLOCK) + at % REVISIT_BITS_BLOCK;
+        counts + at / REVISIT_BITS_BLOCK * size_t{REVISIT_BITS_COLUMNS} * REVISIT_BITS_BLOCK + at % REVISIT_BITS_BLOCK;
   }
   auto least_0 = hn::Set(d, uint8_t{255}), least_1 = least_0, least_2 = least_0, least_3 = least_0;
   const uint8_t* HWY_RESTRICT turned = query.coarse;

@@ -66,7 +66,7 @@ std::uint64_t common(const OverheadImage& fixed, const OverheadImage& moving, in
 OverheadImage overhead_image(const ThinCloud& cloud, double yaw_rad) {
   OverheadImage image;
   const auto c = static_cast<float>(std::cos(yaw_rad)), s = static_cast<float>(std::sin(yaw_rad));
-  constexpr float kMiddle = kSide / 2;
+  constexpr float kMiddle = 0.5f * kSide;
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
     if (cloud.is_ground[i] != 0) continue;
     const Eigen::Vector3f& p = cloud.points[i];
@@ -83,7 +83,7 @@ const OverheadSearch::Turned& OverheadSearch::turned(int step, int reach_m) {
   auto [found, is_new] = turns_.try_emplace((step % kSteps + kSteps) % kSteps);
   Turned& turned = found->second;
   if (is_new) turned.image = overhead_image(query_, found->first * kStep_rad);
-  if (turned.moved_along_x.size() != static_cast<std::size_t>(2 * reach_m + 1)) {
+  if (turned.moved_along_x.size() != 2 * static_cast<std::size_t>(reach_m) + 1) {
     turned.moved_along_x.clear();
     for (int x = -reach_m; x <= reach_m; ++x) turned.moved_along_x.push_back(moved_along_x(turned.image, x));
   }
@@ -102,7 +102,8 @@ OverheadMatch OverheadSearch::search(const ThinCloud& match, double yaw_rad, dou
     const Turned& query = turned(step, reach_m);
     for (int x = -reach_m; x <= reach_m; ++x)
       for (int y = -reach_m; y <= reach_m; ++y) {
-        const std::uint64_t shared = common(place_grown, query.moved_along_x[static_cast<std::size_t>(x + reach_m)], y);
+        const std::uint64_t shared = common(
+            place_grown, query.moved_along_x[static_cast<std::size_t>(x) + static_cast<std::size_t>(reach_m)], y);
         if (shared <= most) continue;
         most = shared;
         best_turn = &query;

@@ -17,7 +17,7 @@ class Axis {
     last_ = std::max(last_, absolute(metres));
   }
   std::size_t cell(float metres) const { return static_cast<std::size_t>(absolute(metres) - first_); }
-  std::size_t cells() const { return static_cast<std::size_t>(last_ - first_ + 1); }
+  std::size_t cells() const { return static_cast<std::size_t>(last_) - static_cast<std::size_t>(first_) + 1; }
 
  private:
   int absolute(float metres) const {
