@@ -5,7 +5,8 @@
 # warehouse with vlp16. Choose nothing on the seeds that figures are reported for.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-poses=$(realpath "$1") out=$2 seed=${3:-41}
+usage="usage: scripts/accuracy.sh POSES_FOLDER OUT [SEED] [SEQUENCE-SENSOR ...]"
+poses=$(realpath "${1:?$usage}") out=${2:?$usage} seed=${3:-42}
 shift $(($# < 3 ? $# : 3))
 if [ $# -eq 0 ]; then
   set -- {00,02,05,06,07,08}-{hdl64e,vlp16} warehouse-vlp16

@@ -17,5 +17,7 @@ describe warehouse warehouse vlp16 400 30
 if [ -d "$kitti" ]; then
   poses=$(realpath "$kitti/../poses/kitti_00.txt")
   printf '[simulation]\ntrajectory = "%s"\nmotion_distortion = false\n' "$poses" > "$work/simulated.toml"
-  build/revisit info "$work/simulated.toml" --beside "$kitti" --picture docs/images/simulation_statistics.png
+  printf '[descriptor]\nrings = 60\nsectors = 20\nlevels = 0\nmax_range_m = 50\n' > "$work/grid.toml"
+  build/revisit info "$work/simulated.toml" --beside "$kitti" --parameters "$work/grid.toml" \
+    --picture docs/images/simulation_statistics.png
 fi

@@ -60,7 +60,8 @@ Result<RecordingStatistics> collect_statistics(const Recording& recording, const
   result.range_share.resize(40);
   result.intensity_share.resize(38);
   result.cell_share.resize(static_cast<std::size_t>(parameters.descriptor.rings));
-  result.cells = static_cast<double>(parameters.descriptor.rings) * parameters.descriptor.sectors;
+  result.cells = static_cast<double>(parameters.descriptor.rings) * parameters.descriptor.sectors *
+                 std::max(1, parameters.descriptor.levels);
   const std::size_t wanted = std::min(kSample, recording.size());
   double scans_with_rings = 0.0;
   for (std::size_t k = 0; k < wanted; ++k) {

@@ -53,7 +53,7 @@ struct TemporalOptions {
   double min_score = 0.0;  ///< xi, on Phi_g + Phi_i; 0 = reported but never refused
 };
 
-/// Geometric consistency: FPFH, then ICP (paper, section III-D).
+/// Geometric consistency (paper, section III-D): from overhead or FPFH, then ICP, then evidence (docs/method.md).
 struct GeometricOptions {
   double voxel_m = 1.0;                     ///< edge of the voxels that thin a scan
   int candidates = 3;                       ///< how many of the top-K are registered, best first

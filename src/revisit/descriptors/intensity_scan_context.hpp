@@ -32,7 +32,8 @@ struct IntensityScanContext {
                      static_cast<std::size_t>(layer) * static_cast<std::size_t>(rings) + static_cast<std::size_t>(ring);
     return (occupancy[bit / 64] >> (bit % 64) & 1u) != 0;
   }
-  int occupied_cells() const;  ///< of all layers
+  int occupied_cells() const;  ///< of all layers, out of image_cells()
+  std::size_t image_cells() const { return static_cast<std::size_t>(rows()) * static_cast<std::size_t>(sectors); }
 };
 
 /// A descriptor that lies elsewhere, in an index for instance.

@@ -10,6 +10,11 @@
 #include <oneapi/tbb/parallel_for.h>
 
 namespace revisit {
+namespace {
+
+constexpr int kOverheadReach_m = 6;  // a translation that retrieval may be off
+
+}  // namespace
 
 CandidateRow Detection::row() const {
   CandidateRow row;
@@ -186,9 +191,8 @@ void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
 void LoopDetector::look_from_overhead(OverheadSearch& overhead, Opinion& opinion) const {
   // Half a sector of the descriptor and a little more.
   const double yaw_reach_rad = kPi / parameters_.descriptor.sectors + to_radians(3.0);
-  constexpr int kReach_m = 6;
-  const OverheadMatch found =
-      overhead.search(places_.at(opinion.candidate.match).cloud, opinion.candidate.yaw_rad, yaw_reach_rad, kReach_m);
+  const OverheadMatch found = overhead.search(places_.at(opinion.candidate.match).cloud, opinion.candidate.yaw_rad,
+                                              yaw_reach_rad, kOverheadReach_m);
   opinion.T_guess_match_query = planar_pose(found.x_m, found.y_m, found.yaw_rad);
   opinion.overlap = found.overlap;
   if (found.overlap < parameters_.geometric.min_overlap) {
@@ -235,7 +239,7 @@ std::optional<LoopDetector::Opinion> LoopDetector::nearer_place(OverheadSearch& 
     if (place == places_.end() || *detection.newest_searchable < FrameId{frame} ||
         frame == answer.candidate.match.value)
       continue;
-    const OverheadMatch found = overhead.search(place->second.cloud, yaw_rad, to_radians(3.0), 6);
+    const OverheadMatch found = overhead.search(place->second.cloud, yaw_rad, to_radians(3.0), kOverheadReach_m);
     const double distance_m = std::hypot(found.x_m, found.y_m);
     if (found.overlap < parameters_.geometric.min_overlap || distance_m >= least_m) continue;
     least_m = distance_m;

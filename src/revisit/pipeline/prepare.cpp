@@ -81,7 +81,7 @@ Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const
     return Error{"frame " + std::to_string(prepared.scan.frame.value) + ": " +
                  std::to_string(prepared.scan.points.size()) + " usable points occupy " +
                  std::to_string(prepared.descriptor.occupied_cells()) + " of " +
-                 std::to_string(prepared.descriptor.cells()) + " cells; at least " +
+                 std::to_string(prepared.descriptor.image_cells()) + " cells; at least " +
                  std::to_string(parameters.descriptor.min_occupied_cells) + " are needed to describe a place"};
 
   prepared.cloud = thin(prepared.scan.points, prepared.ground.is_ground, parameters.geometric.voxel_m);

@@ -19,7 +19,9 @@ void undistort(Scan& scan, const Twist& motion) {
     T_stamp_moment[static_cast<std::size_t>(i)] =
         motion_after(motion, static_cast<double>(*first + (static_cast<float>(i) + 0.5f) * step_s)).cast<float>();
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
-    const auto moment = static_cast<std::size_t>((scan.times_s[i] - *first) / step_s);
+    const float steps = (scan.times_s[i] - *first) / step_s;
+    if (!std::isfinite(steps)) continue;  // a point without a time stays where it is
+    const auto moment = static_cast<std::size_t>(std::max(0.f, steps));
     Point& p = scan.points[i];
     const Eigen::Vector3f q = T_stamp_moment[std::min<std::size_t>(moment, kMoments)] * Eigen::Vector3f(p.x, p.y, p.z);
     p.x = q.x();

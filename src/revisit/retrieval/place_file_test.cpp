@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/retrieval/place_index.hpp>
 
+#include <unistd.h>
+
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -54,9 +56,8 @@ class PlaceFile : public testing::Test {
     return folder / "other.places";
   }
 
-  const fs::path folder =
-      fs::temp_directory_path() / ("revisit_" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()) +
-                                   "_" + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  const fs::path folder = fs::temp_directory_path() / ("revisit_" + std::to_string(::getpid()) + "_" +
+                                                       ::testing::UnitTest::GetInstance()->current_test_info()->name());
   const fs::path path = folder / "map.places";
 };
 
