@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/descriptors/internal/baselines.hpp>
+
+namespace revisit {
+
+std::vector<std::unique_ptr<Baseline>> make_baselines() {
+  using namespace descriptors_internal;
+  std::vector<std::unique_ptr<Baseline>> all;
+  all.push_back(make_published_isc());
+  all.push_back(make_scan_context(10));
+  all.push_back(make_scan_context(0));
+  all.push_back(make_m2dp());
+  return all;
+}
+
+}  // namespace revisit

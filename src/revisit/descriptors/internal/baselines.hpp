@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <revisit/descriptors/baseline.hpp>
+
+namespace revisit::descriptors_internal {
+
+std::unique_ptr<Baseline> make_published_isc();
+std::unique_ptr<Baseline> make_scan_context(std::size_t nearest_ring_keys);  ///< 0: every place is compared
+std::unique_ptr<Baseline> make_m2dp();
+
+}  // namespace revisit::descriptors_internal

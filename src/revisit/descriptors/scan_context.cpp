@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// Kim and Kim, "Scan Context: Egocentric Spatial Descriptor for Place Recognition within 3D Point Cloud Map",
+// IROS 2018: 20 rings x 60 sectors up to 80 m, each cell the height of its highest point; the distance of two scans is
+// the mean cosine distance of their columns (eq. 6) at the best of all column shifts (eq. 7); the ring key, the share
+// of occupied cells a ring, finds those that are compared (section III-C).
+#include <algorithm>
+#include <cmath>
+
+#include <revisit/core/pose.hpp>
+#include <revisit/descriptors/internal/baselines.hpp>
+
+namespace revisit::descriptors_internal {
+namespace {
+
+constexpr int kRings = 20, kSectors = 60;
+constexpr float kMaxRange_m = 80.f;
+
+class ScanContext final : public Baseline {
+ public:
+  explicit ScanContext(std::size_t nearest_ring_keys) : nearest_ring_keys_(nearest_ring_keys) {}
+
+  std::string name() const override { return nearest_ring_keys_ == 0 ? "scan-context" : "scan-context-ring-key"; }
+  std::string source() const override {
+    return nearest_ring_keys_ == 0 ? "Kim and Kim, IROS 2018; every place compared"
+                                   : "Kim and Kim, IROS 2018; the ten places of nearest ring key compared";
+  }
+
+  // Columns of unit length, so that a cosine is one product; empty columns stay zero.
+  Signature describe(std::span<const Point> points, double ground_z_m) const override {
+    Signature image = Signature::Zero(kRings, kSectors);
+    const auto ground_z = static_cast<float>(ground_z_m);
+    for (const Point& p : points) {
+      const float range_m = std::hypot(p.x, p.y);
+      if (range_m >= kMaxRange_m) continue;
+      const int ring = static_cast<int>(range_m * kRings / kMaxRange_m);
+      const float turns = (std::atan2(p.y, p.x) + static_cast<float>(kPi)) / static_cast<float>(2.0 * kPi);
+      const int sector = std::min(static_cast<int>(turns * kSectors), kSectors - 1);
+      image(ring, sector) = std::max(image(ring, sector), p.z - ground_z);
+    }
+    for (auto column : image.colwise())
+      if (!column.isZero()) column.normalize();
+    return image;
+  }
+
+  double similarity(const Signature& query, const Signature& place) const override {
+    const Eigen::Matrix<float, kSectors, kSectors> cosines = query.transpose() * place;
+    Eigen::Array<bool, kSectors, 1> is_seen_by_query, is_seen_by_place;
+    for (int j = 0; j < kSectors; ++j) {
+      is_seen_by_query[j] = (query.col(j).array() > 0.f).any();
+      is_seen_by_place[j] = (place.col(j).array() > 0.f).any();
+    }
+    double best = 0.0;
+    for (int shift = 0; shift < kSectors; ++shift) {
+      // A cosine with an empty column is not defined: such pairs do not count.
+      double sum = 0.0;
+      int columns = 0;
+      for (int j = 0; j < kSectors; ++j) {
+        const int k = j + shift < kSectors ? j + shift : j + shift - kSectors;
+        sum += static_cast<double>(cosines(j, k));
+        columns += is_seen_by_query[j] && is_seen_by_place[k];
+      }
+      if (columns > 0) best = std::max(best, sum / columns);
+    }
+    return best;
+  }
+
+  Eigen::VectorXf key(const Signature& image) const override {
+    if (nearest_ring_keys_ == 0) return {};
+    return (image.array() > 0.f).cast<float>().rowwise().mean();
+  }
+  std::size_t nearest_keys() const override { return nearest_ring_keys_; }
+
+ private:
+  std::size_t nearest_ring_keys_;
+};
+
+}  // namespace
+
+std::unique_ptr<Baseline> make_scan_context(std::size_t nearest_ring_keys) {
+  return std::make_unique<ScanContext>(nearest_ring_keys);
+}
+
+}  // namespace revisit::descriptors_internal
