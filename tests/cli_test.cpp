@@ -131,6 +131,33 @@ TEST(Cli, DetectAndEvaluateARecordingWithLoops) {
   EXPECT_NE(again.output.find("--overwrite"), std::string::npos) << "results are not lost by a second run";
 }
 
+TEST(Cli, CompareRunsEachMethodOverTheSameScans) {
+  const fs::path folder = fresh_folder(), drive = there_and_back(folder / "drive"), out = folder / "compared";
+  const std::string exclusion = " --retrieval.exclude_frames 3 --retrieval.exclude_s 3";
+  const Outcome all = run("compare " + drive.string() + exclusion + " --out " + out.string());
+  ASSERT_EQ(all.code, 0) << all.output;
+  for (const char* method : {"revisit", "isc-paper", "isc-program", "scan-context-ring-key", "scan-context", "m2dp"}) {
+    EXPECT_NE(all.output.find(method), std::string::npos) << all.output;
+    EXPECT_TRUE(fs::exists(out / method / "candidates.csv")) << method;
+  }
+  EXPECT_GT(fs::file_size(out / "precision_recall.png"), 1000u);
+  EXPECT_NE(content(out / "comparison.json").find("\"recall_at_p100\""), std::string::npos);
+  // Scan Context answers every scan that has a past, ring key or not, with an earlier one.
+  const auto answers = read_candidates(out / "scan-context" / "candidates.csv");
+  ASSERT_TRUE(answers);
+  EXPECT_EQ(answers->size(), 9u);
+  for (const CandidateRow& row : *answers) EXPECT_LE(row.match->value, row.query.value - 3);
+
+  const Outcome again = run("compare " + drive.string() + exclusion + " --methods m2dp --out " + out.string());
+  EXPECT_EQ(again.code, 1) << again.output;  // results are there already
+  const Outcome unknown = run("compare " + drive.string() + " --methods nothing --out " + (folder / "x").string());
+  EXPECT_EQ(unknown.code, 2) << unknown.output;
+  fs::remove(drive / "poses.txt");
+  const Outcome without = run("compare " + drive.string() + " --out " + (folder / "y").string());
+  EXPECT_EQ(without.code, 1);
+  EXPECT_NE(without.output.find("--poses"), std::string::npos) << without.output;
+}
+
 TEST(Cli, ASearchWithoutAPastSaysSo) {
   const fs::path folder = fresh_folder(), recording = there_and_back(folder / "recording");
   const Outcome outcome = run("detect " + recording.string() + " --out " + (folder / "out").string());

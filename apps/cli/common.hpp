@@ -31,6 +31,7 @@ enum ExitCode : int {
 using Run = std::function<int()>;
 Run add_detect(CLI::App& program);
 Run add_evaluate(CLI::App& program);
+Run add_compare(CLI::App& program);
 Run add_describe(CLI::App& program);
 Run add_calibrate(CLI::App& program);
 Run add_info(CLI::App& program);

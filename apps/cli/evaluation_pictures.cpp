@@ -20,11 +20,12 @@ void draw_curve(Canvas& canvas, const Chart& chart, const RetrievalTable& table,
     for (const Pixel& point : line) canvas.dot(point, 3.5, colour);
 }
 
-void draw_legend_entry(Canvas& canvas, Pixel at, const char* name, const RetrievalTable& table, const Colour& colour) {
-  char text[160];
-  std::snprintf(text, sizeof text, "%s: %zu revisits, R@1 %.3f, F1max %.3f, AP %.3f, R@P100 %.3f", name, table.revisits,
-                table.recall_at_1, table.f1_max, table.average_precision, table.recall_at_p100);
-  canvas.line({at, {at.x + 30, at.y}}, colour, 3);
+void draw_legend_entry(Canvas& canvas, Pixel at, const Curve& curve) {
+  const RetrievalTable& table = *curve.table;
+  char text[200];
+  std::snprintf(text, sizeof text, "%s: %zu revisits, R@1 %.3f, F1max %.3f, AP %.3f, R@P100 %.3f", curve.name.c_str(),
+                table.revisits, table.recall_at_1, table.f1_max, table.average_precision, table.recall_at_p100);
+  canvas.line({at, {at.x + 30, at.y}}, curve.colour, 3);
   canvas.text({at.x + 40, at.y}, text, 14);
 }
 
@@ -32,17 +33,26 @@ void draw_legend_entry(Canvas& canvas, Pixel at, const char* name, const Retriev
 
 Status draw_precision_recall(const std::filesystem::path& file, const RetrievalTable& all,
                              const RetrievalTable& reverse) {
-  Canvas canvas(900, 760);
+  std::vector<Curve> curves{{"all", &all, kAll}};
+  if (reverse.revisits > 0) curves.push_back({"reverse", &reverse, kReverse});
+  return draw_precision_recall(file, curves);
+}
+
+Status draw_precision_recall(const std::filesystem::path& file, const std::vector<Curve>& curves) {
+  Canvas canvas(900, 700 + 28 * static_cast<int>(curves.size()));
   Chart chart(canvas, {90, 60, 770, 560}, {0.0, 1.02}, {0.0, 1.02});
   chart.draw_axes("precision over recall, top-1 answers, same place within 4 m", "recall", "precision");
-  draw_curve(canvas, chart, all, kAll);
-  draw_legend_entry(canvas, {90, 692}, "all", all, kAll);
-  if (reverse.revisits > 0) {
-    draw_curve(canvas, chart, reverse, kReverse);
-    draw_legend_entry(canvas, {90, 720}, "reverse", reverse, kReverse);
+  Pixel legend{90, 692};
+  for (const Curve& curve : curves) {
+    draw_curve(canvas, chart, *curve.table, curve.colour);
+    draw_legend_entry(canvas, legend, curve);
+    legend.y += 28;
   }
-  if (all.revisits > 0 && all.curve.empty()) canvas.text({475, 340}, "no answers", 18, Align::kCentre);
-  if (all.revisits == 0) canvas.text({475, 340}, "no revisits in this recording", 18, Align::kCentre);
+  const auto each_is = [&](auto what) { return std::all_of(curves.begin(), curves.end(), what); };
+  if (each_is([](const Curve& curve) { return curve.table->revisits == 0; }))
+    canvas.text({475, 340}, "no revisits in this recording", 18, Align::kCentre);
+  else if (each_is([](const Curve& curve) { return curve.table->curve.empty(); }))
+    canvas.text({475, 340}, "no answers", 18, Align::kCentre);
   return canvas.save_png(file);
 }
 

@@ -2,14 +2,25 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include <revisit/core/result.hpp>
 
 #include <revisit/evaluation/loop_table.hpp>
 #include <revisit/evaluation/retrieval_table.hpp>
 
+#include "canvas.hpp"
+
 namespace revisit::cli {
 
+/// A line of a chart of precision over recall; the table must outlive it.
+struct Curve {
+  std::string name;
+  const RetrievalTable* table = nullptr;
+  Colour colour;
+};
+Status draw_precision_recall(const std::filesystem::path& file, const std::vector<Curve>& curves);
 Status draw_precision_recall(const std::filesystem::path& file, const RetrievalTable& all,
                              const RetrievalTable& reverse);
 

@@ -1,30 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "report.hpp"
 
-#include <cstdio>
-#include <vector>
-
 #include <nlohmann/json.hpp>
+
+#include "table.hpp"
 
 namespace revisit::cli {
 namespace {
 
-template <typename... Values>
-std::string format(const char* pattern, Values... values) {
-  char text[256];
-  std::snprintf(text, sizeof text, pattern, values...);
-  return text;
-}
-
-std::string escape(const std::string& text) {
-  std::string safe;
-  for (const char c : text) safe += c == '<' ? "&lt;" : c == '&' ? "&amp;" : std::string(1, c);
-  return safe;
-}
-
-// Rows of a table as cells, so that text and HTML show the same numbers. Without revisits there is no recall.
-using Table = std::vector<std::vector<std::string>>;
-
+// Without revisits there is no recall.
 Table table_1(const EvaluationReport& report) {
   Table table = {{"", "revisits", "answers", "R@1", "F1max", "AP", "R@P100", "EP"}};
   const auto add = [&](const char* name, const RetrievalTable& t) {
@@ -51,29 +35,6 @@ Table table_2(const EvaluationReport& report) {
       {std::to_string(t.accepted), std::to_string(t.false_loops), t.accepted == 0 ? "-" : format("%.3f", t.precision),
        recall(t.recall, t.revisits), recall(t.reverse_recall, t.reverse_revisits), error(t.median_translation_m, "m"),
        error(t.p95_translation_m, "m"), error(t.median_rotation_deg, "deg"), error(t.p95_rotation_deg, "deg")}};
-}
-
-std::string to_text(const Table& table) {
-  std::string text;
-  for (const auto& row : table) {
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      std::size_t width = 0;
-      for (const auto& each : table) width = std::max(width, each[i].size());
-      text += std::string(width - row[i].size() + 2, ' ') + row[i];
-    }
-    text += '\n';
-  }
-  return text;
-}
-
-std::string to_html(const Table& table) {
-  std::string html = "<table>\n";
-  for (std::size_t r = 0; r < table.size(); ++r) {
-    html += "<tr>";
-    for (const auto& cell : table[r]) html += (r == 0 ? "<th>" : "<td>") + escape(cell) + (r == 0 ? "</th>" : "</td>");
-    html += "</tr>\n";
-  }
-  return html + "</table>\n";
 }
 
 std::string rules_text(const EvaluationReport& report) {
@@ -136,8 +97,8 @@ std::string to_html(const EvaluationReport& report) {
          "<style>body{font-family:sans-serif;max-width:1000px;margin:2em auto}table{border-collapse:collapse}"
          "th,td{border:1px solid #bbb;padding:.3em .7em;text-align:right}img{max-width:100%}</style>\n"
          "<h1>Loop closures</h1>\n<p>Results: " +
-         escape(report.results) + "<br>Reference: " + escape(report.reference) + "</p>\n<p>" + rules_text(report) +
-         "</p>\n<h2>Table 1, retrieval</h2>\n" + to_html(table_1(report)) +
+         html_escape(report.results) + "<br>Reference: " + html_escape(report.reference) + "</p>\n<p>" +
+         rules_text(report) + "</p>\n<h2>Table 1, retrieval</h2>\n" + to_html(table_1(report)) +
          "<p>R@1: recall without a threshold. F1max: best harmonic mean of precision and recall. AP: area under the "
          "curve. "
          "R@P100: recall before the first false answer. EP: mean of the first precision and R@P100.</p>\n" +
