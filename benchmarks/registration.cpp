@@ -70,7 +70,7 @@ void align(benchmark::State& state) {
     const Pair& pair = pairs()[next++ % pairs().size()];
     Pose T_guess = Pose::Identity();
     T_guess.linear() = pair.T_target_source.linear();
-    const IcpResult result = align_icp(pair.target, pair.source, T_guess);
+    const IcpResult result = align_icp(pair.target, pair.source.points(), T_guess);
     worst_m = std::max(worst_m, (result.T_target_source.inverse() * pair.T_target_source).translation().norm());
     iterations += result.iterations;
   }

@@ -35,7 +35,7 @@ int main(int argc, char** argv) {
   std::printf("geometry %.3f, intensity %.3f, yaw %.0f degrees\n", candidates[0].geometry_score,
               candidates[0].intensity_score, revisit::to_degrees(candidates[0].yaw_rad));
   const auto evidence = revisit::check_geometric(
-      geometries[0], geometries[1], revisit::planar_pose(0, 0, candidates[0].yaw_rad), parameters.geometric);
-  std::printf("inlier ratio %.2f, rmse %.3f m: %s\n", evidence.inlier_ratio, evidence.rmse_m,
+      geometries[0], geometries[1], {revisit::planar_pose(0, 0, candidates[0].yaw_rad)}, parameters.geometric);
+  std::printf("inlier ratio %.2f, rmse %.3f m: %s\n", evidence.evidence.inlier_ratio, evidence.evidence.rmse_m,
               evidence.consistent ? "the same place" : evidence.reason.c_str());
 }

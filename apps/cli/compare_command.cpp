@@ -167,9 +167,9 @@ int compare(const Options& options) {
   for (Method& method : *methods) reports.push_back(std::move(method.report));
   std::cout << to_text(reports);
   const fs::path out = options.out;
-  for (const Status& status : {write_text(out / "comparison.txt", to_text(reports)),
-                               write_text(out / "comparison.json", to_json(reports)),
-                               draw_comparison(out / "precision_recall.png", reports)})
+  for (const Status& status :
+       {write_text(out / "comparison.txt", to_text(reports)), write_text(out / "comparison.json", to_json(reports)),
+        draw_comparison(out / "precision_recall.png", reports)})
     if (!status) return fail(status.error());
   std::cout << "Picture: " << (out / "precision_recall.png").string() << '\n';
   return interrupted() ? kInterrupted : kDone;
@@ -179,9 +179,11 @@ int compare(const Options& options) {
 
 Run add_compare(CLI::App& program) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = program.add_subcommand("compare", "Run several published methods over a recording, side by side.");
+  CLI::App* command =
+      program.add_subcommand("compare", "Run several published methods over a recording, side by side.");
   std::string footer =
-      "Prints tables 1 and 2 (docs/evaluation.md) with a row a method, judged by the poses of the recording, and writes\n"
+      "Prints tables 1 and 2 (docs/evaluation.md) with a row a method, judged by the poses of the recording, and "
+      "writes\n"
       "comparison.txt, comparison.json, precision_recall.png and a folder a method with its candidates.csv and\n"
       "loops.csv. Each method takes the same scans and may answer with the same earlier ones.\n\n"
       "Methods:\n"

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <chrono>
+#include <fstream>
+#include <iomanip>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -19,7 +20,7 @@ namespace {
 
 struct Options {
   std::string input, out, database, calibration, poses;
-  bool overwrite = false;
+  bool overwrite = false, evidence = false;
   ParameterFlags parameters;
 };
 
@@ -40,6 +41,36 @@ void count(RunFile& run, const Detection& detection) {
                                      {"geometric", detection.geometric_ms}})
     run.ms_total[stage] += value;
 }
+
+// evidence.csv: what spoke for and against every candidate that was registered.
+class EvidenceFile {
+ public:
+  static constexpr const char* kHeader =
+      "query,match,inlier_ratio,free_space_agreement,intensity_agreement,rmse_m,overlap,distance_m,log_odds,"
+      "tx,ty,tz,qx,qy,qz,qw\n";
+  explicit EvidenceFile(const std::filesystem::path& file) : file_(file.string()), stream_(file) {
+    stream_ << kHeader << std::setprecision(10);
+  }
+  Status add(const Detection& detection) {
+    for (const Detection::Registered& each : detection.registered) {
+      const LoopEvidence& e = each.evidence.evidence;
+      const Eigen::Vector3d t = each.evidence.T_match_query.translation();
+      const Eigen::Quaterniond q(each.evidence.T_match_query.rotation());
+      stream_ << detection.frame.value << ',' << each.match.value << ',' << e.inlier_ratio << ','
+              << e.free_space_agreement << ',';
+      if (e.intensity_agreement) stream_ << *e.intensity_agreement;
+      for (const double value :
+           {e.rmse_m, e.overlap, e.distance_m, each.evidence.log_odds, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()})
+        stream_ << ',' << value;
+      stream_ << '\n';
+    }
+    return stream_ ? ok() : Status(Error{file_ + ": cannot be written"});
+  }
+
+ private:
+  std::string file_;
+  std::ofstream stream_;
+};
 
 // Scans that cannot be used are told, counted and left out; the rest goes on.
 void skip(RunFile& run, Progress& progress, const Error& error) {
@@ -70,7 +101,8 @@ Status learn_database(LoopDetector& detector, const Recording& database, RunFile
   return ok();
 }
 
-Status detect_all(LoopDetector& detector, const Recording& recording, ResultWriter& writer, RunFile& run) {
+Status detect_all(LoopDetector& detector, const Recording& recording, ResultWriter& writer,
+                  std::optional<EvidenceFile>& evidence, RunFile& run) {
   Progress progress("detect", "scans", recording.size());
   ReadAhead scans(recording);
   for (std::size_t i = 0; i < recording.size() && !interrupted(); ++i) {
@@ -91,6 +123,8 @@ Status detect_all(LoopDetector& detector, const Recording& recording, ResultWrit
       ++run.counts["scans"];
       count(run, *detection);
       if (const Status status = write_loop(writer, *detection); !status) return status;
+      if (evidence)
+        if (const Status status = evidence->add(*detection); !status) return status;
     }
     progress.update(i + 1);
   }
@@ -148,7 +182,9 @@ int detect(const Options& options) {
   LoopDetector detector(*parameters, *scale, *calibration, print_log());
   if (*database)
     if (const Status status = learn_database(detector, **database, run); !status) return fail(status.error());
-  Status status = detect_all(detector, **recording, *writer, run);
+  std::optional<EvidenceFile> evidence;
+  if (options.evidence) evidence.emplace(out / "evidence.csv");
+  Status status = detect_all(detector, **recording, *writer, evidence, run);
   run.counts["skipped"] = run.skipped.size();
   // run.json comes last and says how far the run came, whatever happened.
   const Status finished = writer->finish();
@@ -193,6 +229,8 @@ Run add_detect(CLI::App& program) {
                       "Pose file (KITTI, TUM, g2o), instead of the recording's own poses; never used to find loops");
   command->add_option("--calibration", options->calibration, "Intensity calibration made by `revisit calibrate`");
   command->add_flag("--overwrite", options->overwrite, "Replace results that are already in the folder");
+  command->add_flag("--evidence", options->evidence,
+                    "Write evidence.csv too: what spoke for and against every candidate that was registered");
   options->parameters.add_to(*command);
   return [options] { return detect(*options); };
 }

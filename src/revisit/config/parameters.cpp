@@ -84,12 +84,8 @@ const std::vector<Entry>& table() {
       REVISIT_REAL(geometric, inlier_distance_m, 0.01, 5, "farthest point-to-plane distance of an inlier"),
       REVISIT_REAL(geometric, min_inlier_ratio, 0, 1,
                    "share of the points above ground, in both directions, that must be inliers"),
-      REVISIT_REAL(
-          geometric, min_free_space_agreement, 0, 1,
-          "least share, in both directions, of points that fit among these and the points that stand where the "
-          "other scan saw through"),
-      REVISIT_REAL(geometric, min_intensity_correlation, -1, 1,
-                   "least correlation of the intensities of points that fit with those they lie on; -1 never refuses"),
+      REVISIT_REAL(geometric, min_probability, 0, 1,
+                   "least probability that the pose is right, from all evidence together; 0 never refuses"),
       REVISIT_REAL(geometric, max_translation_m, 0.1, 1000, "a longer relative translation is refused"),
       REVISIT_TEXT(simulation, world, "what is driven through: town or warehouse"),
       REVISIT_TEXT(simulation, sensor, "what looks about: hdl64e, vlp16, os0-128 or rosette"),
@@ -203,8 +199,7 @@ Result<Parameters> preset(std::string_view name) {
     p.temporal.min_score = 1.8;
     p.geometric.min_descriptor_score = 0.0;
     p.geometric.min_inlier_ratio = 0.6;
-    p.geometric.min_free_space_agreement = 0.0;
-    p.geometric.min_intensity_correlation = -1.0;
+    p.geometric.min_probability = 0.0;
     p.geometric.overhead_search = false;
     p.geometric.features_first = true;
     return p;

@@ -55,19 +55,18 @@ struct TemporalOptions {
 
 /// Geometric consistency (paper, section III-D): from overhead or FPFH, then ICP, then evidence (docs/method.md).
 struct GeometricOptions {
-  double voxel_m = 1.0;                     ///< edge of the voxels that thin a scan
-  int candidates = 3;                       ///< how many of the top-K are registered, best first
-  double min_descriptor_score = 0.0;        ///< candidates with a lower Phi_g + Phi_i are not registered
-  bool overhead_search = true;              ///< find position and heading from overhead before registering
-  double min_overlap = 0.4;                 ///< of both images from overhead; candidates below are not registered
-  bool features_first = false;              ///< start from FPFH, as the paper does, before trying the descriptors' yaw
-  bool features_fallback = false;           ///< try FPFH where the descriptors' yaw gave no accepted registration; slow
-  double feature_radius_m = 3.0;            ///< neighbourhood of FPFH features
-  double inlier_distance_m = 0.4;           ///< farthest point-to-plane distance of an inlier
-  double min_inlier_ratio = 0.45;           ///< share of the points above ground, both ways, that must be inliers
-  double min_free_space_agreement = 0.94;   ///< inliers among these and points where the other scan saw through
-  double min_intensity_correlation = 0.45;  ///< of points that fit with those they lie on
-  double max_translation_m = 15.0;          ///< a longer relative translation is refused
+  double voxel_m = 1.0;               ///< edge of the voxels that thin a scan
+  int candidates = 3;                 ///< how many of the top-K are registered, best first
+  double min_descriptor_score = 0.0;  ///< candidates with a lower Phi_g + Phi_i are not registered
+  bool overhead_search = true;        ///< find position and heading from overhead before registering
+  double min_overlap = 0.4;           ///< of both images from overhead; candidates below are not registered
+  bool features_first = false;        ///< start from FPFH, as the paper does, before trying the descriptors' yaw
+  bool features_fallback = false;     ///< try FPFH where the descriptors' yaw gave no accepted registration; slow
+  double feature_radius_m = 3.0;      ///< neighbourhood of FPFH features
+  double inlier_distance_m = 0.4;     ///< farthest point-to-plane distance of an inlier
+  double min_inlier_ratio = 0.4;      ///< share of the points above ground, both ways, that must be inliers
+  double min_probability = 0.95;      ///< that the pose is right (docs/accuracy.md); 0 never refuses
+  double max_translation_m = 15.0;    ///< a longer relative translation is refused
 };
 
 /// A drive that is simulated instead of read (docs/simulation.md).

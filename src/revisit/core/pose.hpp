@@ -28,6 +28,18 @@ inline double wrap_angle(double rad) {
 /// The angle of the rotation, radians in [0, pi].
 inline double rotation_angle(const Pose& T) { return Eigen::AngleAxisd(T.rotation()).angle(); }
 
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+/// The rigid transform of a small motion: metres, then a rotation vector in radians. To first order in the rotation.
+inline Pose small_motion(const Vector6& xi) {
+  Pose T = Pose::Identity();
+  const double angle = xi.tail<3>().norm();
+  if (angle > 1e-12) T.linear() = Eigen::AngleAxisd(angle, xi.tail<3>() / angle).toRotationMatrix();
+  T.translation() = xi.head<3>();
+  return T;
+}
+
 /// Heading of the x axis seen from above, radians.
 inline double yaw_of(const Pose& T) { return std::atan2(T.linear()(1, 0), T.linear()(0, 0)); }
 

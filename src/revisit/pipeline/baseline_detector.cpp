@@ -15,10 +15,9 @@ std::vector<std::size_t> BaselineDetector::shortlist(const Place& query, std::si
   if (wanted == 0 || searchable <= wanted) return all;
   std::vector<float> distance(searchable);
   for (std::size_t i = 0; i < searchable; ++i) distance[i] = (places_[i].key - query.key).squaredNorm();
-  std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(wanted), all.end(),
-                    [&](std::size_t a, std::size_t b) {
-                      return distance[a] != distance[b] ? distance[a] < distance[b] : a < b;
-                    });
+  std::partial_sort(
+      all.begin(), all.begin() + static_cast<std::ptrdiff_t>(wanted), all.end(),
+      [&](std::size_t a, std::size_t b) { return distance[a] != distance[b] ? distance[a] < distance[b] : a < b; });
   all.resize(wanted);
   return all;
 }

@@ -24,7 +24,7 @@ class ScanToScanOdometry {
       previous_ = std::move(cloud);
       return T_first_last_;
     }
-    const IcpResult icp = align_icp(*previous_, cloud, T_last_step_);
+    const IcpResult icp = align_icp(*previous_, cloud.points(), T_last_step_);
     const Agreement agreement =
         measure_agreement(*previous_, cloud, icp.T_target_source, parameters_.geometric.inlier_distance_m);
     previous_ = std::move(cloud);

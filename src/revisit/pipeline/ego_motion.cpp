@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/pipeline/ego_motion.hpp>
 
+#include <algorithm>
+
 #include <revisit/registration/icp.hpp>
 
 namespace revisit {
@@ -17,16 +19,36 @@ void EgoMotion::learn(double stamp_s, std::shared_ptr<const ScanGeometry> scan) 
   if (follows) {
     // From a standstill the first time: a car goes 3 m in a tenth of a second.
     const Pose T_guess = motion_ ? motion_after(*motion_, gap_s) : Pose::Identity();
-    const IcpResult icp = align_icp(last_->surface(), scan->surface(), T_guess, motion_ ? 1.0 : 4.0);
+    const IcpResult icp =
+        align_icp(last_->surface(), scan->surface().points(), T_guess, {.coarse_m = motion_ ? 1.0 : 4.0});
     constexpr double kInlier_m = 0.4, kFewestInliers = 0.4;
-    if (icp.converged &&
-        measure_agreement(last_->surface(), scan->surface(), icp.T_target_source, kInlier_m).inlier_ratio >=
-            kFewestInliers)
+    const Agreement agreement = measure_agreement(last_->surface(), scan->surface(), icp.T_target_source, kInlier_m);
+    if (icp.converged && agreement.inlier_ratio >= kFewestInliers) {
       motion = twist_of(icp.T_target_source, gap_s);
+      // Of scans from the same spot, intensities would agree too well.
+      constexpr double kStill_m = 0.05;
+      if (agreement.intensity_correlation && icp.T_target_source.translation().norm() > kStill_m)
+        learn_intensities(*agreement.intensity_correlation);
+    }
   }
   motion_ = motion;
   last_ = std::move(scan);
   last_stamp_s_ = stamp_s;
+}
+
+void EgoMotion::learn_intensities(double correlation) {
+  const auto bin = static_cast<std::size_t>(std::clamp(correlation, 0.0, 1.0) * kLastBin + 0.5);
+  ++correlations_[bin];
+  ++pairs_;
+}
+
+std::optional<double> EgoMotion::usual_intensity_correlation() const {
+  if (pairs_ < kFewestPairs) return std::nullopt;
+  std::size_t bin = 0, below = correlations_[0];
+  while (2 * below < pairs_) below += correlations_[++bin];
+  // Intensities that agree badly even here tell nothing elsewhere.
+  constexpr double kLeast = 0.1;
+  return std::max(kLeast, static_cast<double>(bin) / kLastBin);
 }
 
 }  // namespace revisit

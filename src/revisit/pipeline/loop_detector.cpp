@@ -12,7 +12,8 @@
 namespace revisit {
 namespace {
 
-constexpr int kOverheadReach_m = 6;  // a translation that retrieval may be off
+constexpr int kOverheadReach_m = 6;    // a translation that retrieval may be off
+constexpr double kFollowsALoop = 2.0;  // log odds in favour of a candidate next to the loop of a scan just before
 
 }  // namespace
 
@@ -46,12 +47,16 @@ Result<Detection> LoopDetector::process(Scan scan, const std::optional<Pose>& T_
 }
 
 double LoopDetector::Opinion::score() const {
-  // Registration knows best, then the view from overhead, then the descriptors.
-  const double evidence = candidate.geometry_score / 4.0 + overlap / 4.0 + (geometric ? geometric->inlier_ratio : 0.0);
+  // Registration knows best, then the view from overhead, then the descriptors. Flattened, so that no two sure ones
+  // are equal.
+  constexpr double kFlat = 6.0;
+  const double registered = geometric ? 1.0 / (1.0 + std::exp(-geometric->log_odds / kFlat)) : 0.0;
+  const double evidence = candidate.geometry_score / 4.0 + overlap / 4.0 + registered;
   if (!geometric || !reason.empty()) return evidence;
   // A loop over more than this is a right constraint, but not the same place (docs/evaluation.md).
-  constexpr double kSamePlace_m = 4.0;
-  return evidence + (distance_m() <= kSamePlace_m ? 2.0 : 1.0);
+  // Poses have errors: close to the limit it is open which of the two it is.
+  constexpr double kSamePlace_m = 4.0, kOpen_m = 0.5;
+  return evidence + 1.0 + std::clamp((kSamePlace_m - distance_m()) / kOpen_m, 0.0, 1.0);
 }
 
 Status LoopDetector::add(Scan scan, const std::optional<Pose>& T_world_lidar) {
@@ -68,11 +73,10 @@ Result<Detection> LoopDetector::localise(Scan scan) {
 }
 
 Result<PreparedScan> LoopDetector::prepare_next(Scan scan) {
-  // Without times nothing can be undone, and the motion is not asked for.
-  if (scan.times_s.empty()) return prepare(std::move(scan));
-  const std::optional<Twist> motion = ego_motion_.expected(scan.stamp_s);
-  auto prepared = prepare(std::move(scan), motion);
-  if (prepared) {
+  // Without times nothing can be undone.
+  const bool is_swept = !scan.times_s.empty();
+  auto prepared = prepare(std::move(scan), is_swept ? ego_motion_.expected(scan.stamp_s) : std::nullopt);
+  if (prepared && (is_swept || !ego_motion_.knows_intensities())) {
     prepared->geometry = std::make_shared<ScanGeometry>(prepared->cloud);
     ego_motion_.learn(prepared->scan.stamp_s, prepared->geometry);
   }
@@ -157,12 +161,18 @@ void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
     query = std::make_shared<ScanGeometry>(prepared.cloud);
   const auto register_one = [&](Opinion& each) {
     ScanGeometry match(places_.at(each.candidate.match).cloud);
-    each.geometric = check_geometric(match, *query, each.T_guess_match_query, parameters_.geometric);
+    CandidateView view{each.T_guess_match_query, each.overlap};
+    if (follows_a_loop(detection.frame, each.candidate.match)) view.prior_log_odds = kFollowsALoop;
+    if (const auto usual = ego_motion_.usual_intensity_correlation()) view.usual_intensity_correlation = *usual;
+    each.geometric = check_geometric(match, *query, view, parameters_.geometric);
     each.reason = each.geometric->reason;
   };
   tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
     if (opinions[i].reason.empty()) register_one(opinions[i]);
   });
+
+  for (const Opinion& each : opinions)
+    if (each.geometric) detection.registered.push_back({each.candidate.match, *each.geometric});
 
   // The answer is the one that fits best.
   const Opinion* best = nullptr;
@@ -183,9 +193,23 @@ void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
   detection.score = answer.score();
   detection.reason = answer.reason;
   detection.geometric = std::move(answer.geometric);
-  if (detection.reason.empty())
-    detection.loop = LoopConstraint{detection.frame, answer.candidate.match, detection.geometric->T_match_query,
-                                    detection.geometric->inlier_ratio, detection.geometric->rmse_m};
+  if (detection.reason.empty()) {
+    recent_loops_.emplace_back(detection.frame, answer.candidate.match);
+    if (recent_loops_.size() > kLoopsRemembered) recent_loops_.pop_front();
+    const GeometricEvidence& found = *detection.geometric;
+    detection.loop =
+        LoopConstraint{detection.frame,       answer.candidate.match, found.T_match_query, found.evidence.inlier_ratio,
+                       found.evidence.rmse_m, found.probability,      found.information};
+  }
+}
+
+bool LoopDetector::follows_a_loop(FrameId query, FrameId match) const {
+  constexpr std::int64_t kRecent_frames = 10;
+  return std::any_of(recent_loops_.begin(), recent_loops_.end(), [&](const auto& loop) {
+    const std::int64_t since = query.value - loop.first.value;
+    return since <= kRecent_frames &&
+           std::abs(match.value - loop.second.value) <= parameters_.retrieval.separation_frames + 2 * since;
+  });
 }
 
 void LoopDetector::look_from_overhead(OverheadSearch& overhead, Opinion& opinion) const {

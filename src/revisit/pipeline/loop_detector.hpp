@@ -25,7 +25,12 @@ struct Detection {
   std::optional<LoopCandidate> answer;         ///< the candidate that the rest of the evidence is about
   std::optional<TemporalEvidence> temporal;    ///< of the answer; absent where no candidate was found
   std::optional<GeometricEvidence> geometric;  ///< of the answer; absent where it was refused before registration
-  std::optional<LoopConstraint> loop;          ///< set where the answer was accepted
+  struct Registered {
+    FrameId match;
+    GeometricEvidence evidence;
+  };
+  std::vector<Registered> registered;  ///< every candidate that was registered, accepted or not
+  std::optional<LoopConstraint> loop;  ///< set where the answer was accepted
   double score = 0.0;  ///< confidence that orders answers: mean descriptor score, plus the inlier ratio if registered
   std::string reason;  ///< why there is no loop; empty where there is one
   std::optional<Pose> T_match_query_by_odometry;  ///< for comparison, where both scans came with a pose
@@ -85,6 +90,8 @@ class LoopDetector {
   };
 
   void verify(Detection& detection, const PreparedScan& prepared);
+  // Whether a scan shortly before the query was found next to the match.
+  bool follows_a_loop(FrameId query, FrameId match) const;
   void look_from_overhead(OverheadSearch& overhead, Opinion& opinion) const;
   void check_temporal_and_scores(FrameId frame, Opinion& opinion) const;
   // The place among the answer's neighbours that the query stands nearest to, if it is another.
@@ -100,6 +107,8 @@ class LoopDetector {
   PlaceIndex index_;
   std::map<FrameId, Place> places_;
   EgoMotion ego_motion_;
+  static constexpr std::size_t kLoopsRemembered = 10;
+  std::deque<std::pair<FrameId, FrameId>> recent_loops_;                 ///< query and match of the last ones
   std::deque<std::pair<FrameId, IntensityScanContext>> recent_queries_;  ///< the last N, for temporal consistency
 };
 

@@ -142,7 +142,7 @@ TEST(LoopDetectorOnRealScans, NoScanOfOneTownIsAcceptedInAnother) {
     ASSERT_TRUE(detection);
     EXPECT_FALSE(detection->loop) << "frame " << detection->frame.value;
     ASSERT_TRUE(detection->geometric) << "it came as far as registration";
-    EXPECT_LT(detection->geometric->inlier_ratio, 0.3) << "and not near the threshold";
+    EXPECT_LT(detection->geometric->evidence.inlier_ratio, 0.3) << "and not near the threshold";
   }
 }
 

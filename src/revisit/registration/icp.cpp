@@ -13,58 +13,97 @@
 namespace revisit {
 namespace {
 
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
-using Vector6 = Eigen::Matrix<double, 6, 1>;
-
-Pose small_motion(const Vector6& xi) {  // rotation first, then translation
-  Pose T = Pose::Identity();
-  const double angle = xi.head<3>().norm();
-  if (angle > 1e-12) T.linear() = Eigen::AngleAxisd(angle, xi.head<3>() / angle).toRotationMatrix();
-  T.translation() = xi.tail<3>();
-  return T;
-}
-
 constexpr double kAllPointsBelow_m = 1.0;
 constexpr float kSeenMargin_m = 1.f;  // what ranges within a cell of seen space may be off
 
-// The normal equations of a Gauss-Newton step, summed over points.
+// The normal equations of a Gauss-Newton step in the target's frame (metres, then radians), summed over points.
 struct Equations {
   Matrix6 H = Matrix6::Zero();
   Vector6 g = Vector6::Zero();
+  double weights = 0.0, weighted_squares_m2 = 0.0;
   std::size_t pairs = 0;
 
+  // The Geman-McClure weight of a squared residual.
+  double weigh(double squared_m2, double shrink_m2) {
+    const double root = shrink_m2 / (shrink_m2 + squared_m2), weight = root * root;
+    weights += weight;
+    weighted_squares_m2 += weight * squared_m2;
+    return weight;
+  }
   void add(const Equations& other) {
     H += other.H;
     g += other.g;
+    weights += other.weights;
+    weighted_squares_m2 += other.weighted_squares_m2;
     pairs += other.pairs;
   }
 };
 
+using Points = std::span<const Eigen::Vector3f>;
+
+Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& p) {
+  Eigen::Matrix3d m;
+  m << 0, -p.z(), p.y(), p.z(), 0, -p.x(), -p.y(), p.x(), 0;
+  return m;
+}
+
+// The metric of generalised ICP between two patches, scaled so that parallel planes count by their distance alone:
+// the inverse of the sum of covariances that are 1 along a plane and next to nothing across it.
+Eigen::Matrix3d plane_to_plane(const Eigen::Vector3d& n, const Eigen::Vector3d& m) {
+  constexpr double kAcross = 1e-3;
+  const Eigen::Matrix3d covariance =
+      2.0 * Eigen::Matrix3d::Identity() - (1.0 - kAcross) * (n * n.transpose() + m * m.transpose());
+  return 2.0 * kAcross * covariance.inverse();
+}
+
 // Points [begin, end) of the source in steps of `stride`, at kernel width `width_m`.
-Equations equations_of(const SurfaceCloud& target, const SurfaceCloud& source, std::size_t begin, std::size_t end,
-                       std::size_t stride, double width_m, const Pose& T) {
+Equations equations_of(const Surface& target, Points source, Points source_normals, std::size_t begin, std::size_t end,
+                       std::size_t stride, double width_m, double reach_m, const Pose& T) {
   Equations sum;
-  const auto reach2 = static_cast<float>(width_m * width_m);
+  const auto reach2 = static_cast<float>(reach_m * reach_m);
   const double shrink = width_m * width_m / 4.0;
   for (std::size_t i = (begin + stride - 1) / stride * stride; i < end; i += stride) {
-    const Eigen::Vector3d p = T * source.point(i).cast<double>();
-    const auto neighbour = target.nearest(p.cast<float>(), reach2);
-    if (!neighbour) continue;
-    const Eigen::Vector3d n = target.normal(neighbour->index).cast<double>();
+    const Eigen::Vector3d p = T * source[i].cast<double>();
+    Surface::Patch patch;
+    if (!target.nearest_patch(p.cast<float>(), reach2, patch)) continue;
+    const Eigen::Vector3d n = patch.normal.cast<double>(), d = p - patch.point.cast<double>();
     if (n.squaredNorm() < 0.5) continue;
-    const double residual = n.dot(p - target.point(neighbour->index).cast<double>());
-    Vector6 J;
-    J << p.cross(n), n;
-    const double root = shrink / (shrink + residual * residual), weight = root * root;
-    sum.H.noalias() += (weight * J) * J.transpose();
-    sum.g += weight * residual * J;
+    if (source_normals.empty()) {
+      Vector6 J;
+      J << n, p.cross(n);
+      const double residual = n.dot(d);
+      const double weight = sum.weigh(residual * residual, shrink);
+      sum.H.noalias() += (weight * J) * J.transpose();
+      sum.g += weight * residual * J;
+    } else {
+      const Eigen::Matrix3d metric = plane_to_plane(n, T.linear() * source_normals[i].cast<double>());
+      Eigen::Matrix<double, 3, 6> J;
+      J << Eigen::Matrix3d::Identity(), -cross_matrix(p);
+      const double weight = sum.weigh(d.dot(metric * d), shrink);
+      sum.H.noalias() += weight * J.transpose() * metric * J;
+      sum.g.noalias() += weight * J.transpose() * (metric * d);
+    }
     ++sum.pairs;
   }
   return sum;
 }
 
+// What the equations at T say about its error, seen from the source. Points share the errors of the surfaces that they
+// lie on, so that they count for fewer than they are.
+Matrix6 information_of(const Equations& sum, const Pose& T) {
+  constexpr double kPointsThatCountAsOne = 10.0, kLeastNoise_m = 0.02;
+  const double variance_m2 = std::max(kLeastNoise_m * kLeastNoise_m, sum.weighted_squares_m2 / sum.weights);
+  // T * small_motion(xi) = small_motion(adjoint * xi) * T
+  Matrix6 adjoint = Matrix6::Zero();
+  adjoint.topLeftCorner<3, 3>() = adjoint.bottomRightCorner<3, 3>() = T.linear();
+  adjoint.topRightCorner<3, 3>() = cross_matrix(T.translation()) * T.linear();
+  return adjoint.transpose() * sum.H * adjoint / (kPointsThatCountAsOne * variance_m2);
+}
+
 // One Gauss-Newton step; false where the points do not fix the pose.
-bool step(const SurfaceCloud& target, const SurfaceCloud& source, double width_m, Pose& T, double& moved) {
+bool step(const Surface& target, Points source, const IcpOptions& options, double width_m, IcpResult& result,
+          double& moved) {
+  Pose& T = result.T_target_source;
   // While the kernel is wide, some of the points show the way as well as all.
   const std::size_t stride = width_m > kAllPointsBelow_m ? 4 : 1;
   // Split and summed in one order, whatever the number of threads.
@@ -72,20 +111,23 @@ bool step(const SurfaceCloud& target, const SurfaceCloud& source, double width_m
   Equations sum = tbb::parallel_deterministic_reduce(
       tbb::blocked_range<std::size_t>(0, source.size(), kPointsATask * stride), Equations{},
       [&](const tbb::blocked_range<std::size_t>& range, Equations part) {
-        part.add(equations_of(target, source, range.begin(), range.end(), stride, width_m, T));
+        part.add(equations_of(target, source, options.source_normals, range.begin(), range.end(), stride, width_m,
+                              std::max(width_m, options.least_reach_m), T));
         return part;
       },
       [](Equations a, const Equations& b) {
         a.add(b);
         return a;
       });
+  if (!source.empty()) result.matched = sum.weights * static_cast<double>(stride) / static_cast<double>(source.size());
   constexpr std::size_t kFewestPairs = 20;
   if (sum.pairs < kFewestPairs) return false;
+  result.information = information_of(sum, T);
   sum.H.diagonal().array() += 1e-6 * sum.H.diagonal().maxCoeff();  // a direction that nothing sees stays where it was
   const Vector6 xi = sum.H.ldlt().solve(-sum.g);
   if (!xi.allFinite()) return false;
   T = small_motion(xi) * T;
-  moved = xi.head<3>().norm() * 20.0 + xi.tail<3>().norm();  // metres, of a point 20 m away
+  moved = xi.tail<3>().norm() * 20.0 + xi.head<3>().norm();  // metres, of a point 20 m away
   return true;
 }
 
@@ -148,23 +190,22 @@ double range_that_holds_most(const SurfaceCloud& cloud) {
 
 }  // namespace
 
-IcpResult align_icp(const SurfaceCloud& target, const SurfaceCloud& source, const Pose& T_guess_target_source,
-                    double coarse_m, double fine_m) {
+IcpResult align_icp(const Surface& target, std::span<const Eigen::Vector3f> source, const Pose& T_guess_target_source,
+                    const IcpOptions& options) {
   IcpResult result;
   result.T_target_source = T_guess_target_source;
-  if (target.size() == 0 || source.size() == 0) return result;
-  constexpr int kMostIterations = 60;
-  constexpr double kShrink = 0.7, kSteady = 0.03, kSettled_m = 2e-4;
-  double width_m = coarse_m;
-  for (; result.iterations < kMostIterations; ++result.iterations) {
+  constexpr double kShrink = 0.7, kSteady = 0.03;
+  double width_m = options.coarse_m;
+  for (; result.iterations < options.most_iterations; ++result.iterations) {
     double moved = 0.0;
-    if (!step(target, source, width_m, result.T_target_source, moved)) return result;
-    const bool fine = width_m <= fine_m;
-    if (fine && moved < kSettled_m) {
+    if (!step(target, source, options, width_m, result, moved)) return result;
+    result.last_step_m = moved;
+    const bool fine = width_m <= options.fine_m;
+    if (fine && moved < options.settled_m) {
       result.converged = true;
       break;
     }
-    if (moved < kSteady * width_m) width_m = std::max(fine_m, width_m * kShrink);
+    if (moved < kSteady * width_m) width_m = std::max(options.fine_m, width_m * kShrink);
   }
   return result;
 }

@@ -12,12 +12,28 @@ struct IcpResult {
   Pose T_target_source = Pose::Identity();
   bool converged = false;
   int iterations = 0;
+  double last_step_m = 0.0;  ///< how far the last step moved points 20 m away
+  double matched =
+      0.0;  ///< share of the source's points that lie on a patch, each counted by its weight in the last step
+  /// Inverse covariance of xi where the true pose is T_target_source * small_motion(xi): metres, then radians, in the
+  /// source's frame. Small along what the scans do not fix. Zero where too few points met.
+  Matrix6 information = Matrix6::Zero();
 };
 
-/// Point-to-plane ICP with a Geman-McClure kernel whose width shrinks from `coarse_m` to `fine_m`: from a guess a few
-/// metres and some ten degrees off to the nearest optimum. Deterministic.
-IcpResult align_icp(const SurfaceCloud& target, const SurfaceCloud& source, const Pose& T_guess_target_source,
-                    double coarse_m = 4.0, double fine_m = 0.5);
+struct IcpOptions {
+  double coarse_m = 4.0, fine_m = 0.5;  ///< widths of the kernel, first and last
+  double least_reach_m = 0.0;  ///< points look for a patch within the kernel's width, or this where it is larger
+  double settled_m = 2e-4;     ///< converged where a step at the last width moves points 20 m away less than this
+  int most_iterations = 60;
+  /// Normals of the source, one a point: plane-to-plane (generalised ICP, Segal et al., RSS 2009, with the covariances
+  /// of planes); empty: point-to-plane.
+  std::span<const Eigen::Vector3f> source_normals = {};
+};
+
+/// ICP with a Geman-McClure kernel whose width shrinks: from a guess a few metres and some ten degrees off to the
+/// nearest optimum. `source` in metres. Deterministic, whatever the number of threads.
+IcpResult align_icp(const Surface& target, std::span<const Eigen::Vector3f> source, const Pose& T_guess_target_source,
+                    const IcpOptions& options = {});
 
 /// How well a relative pose explains both scans.
 struct Agreement {

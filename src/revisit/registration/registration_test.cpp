@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <pcl/point_types.h>
+#include <pcl/registration/gicp.h>
 #include <pcl/registration/icp.h>
 
 #include <revisit/registration/feature_alignment.hpp>
@@ -83,7 +84,7 @@ TEST(Icp, FindsAKnownMotionFromMetresAway) {
   const Pose T_a = SyntheticWorld::at(0, 0, 0), T_b = SyntheticWorld::at(2.5, 0.8, to_radians(8.0));
   const SurfaceCloud a(thin_scan(T_a)), b(thin_scan(T_b, 2));
   const Pose T_truth = T_a.inverse() * T_b;
-  const IcpResult result = align_icp(a, b, Pose::Identity());
+  const IcpResult result = align_icp(a, b.points(), Pose::Identity());
   EXPECT_TRUE(result.converged);
   EXPECT_LT(error_m(result.T_target_source, T_truth), 0.05);
   EXPECT_LT(error_deg(result.T_target_source, T_truth), 0.2);
@@ -111,14 +112,58 @@ TEST(Icp, AgreesWithPclFromNearby) {
   pcl::PointCloud<pcl::PointNormal> unused;
   oracle.align(unused);
   const Pose T_oracle(oracle.getFinalTransformation().cast<double>());
-  const Pose T = align_icp(a, b, Pose::Identity(), 1.0, 0.5).T_target_source;
+  const Pose T = align_icp(a, b.points(), Pose::Identity(), {.coarse_m = 1.0}).T_target_source;
   EXPECT_LT(error_m(T, T_oracle), 0.05);
   EXPECT_LT(error_deg(T, T_oracle), 0.2);
 }
 
+TEST(Icp, PlaneToPlaneAgreesWithPclsGeneralisedIcp) {
+  const Pose T_a = SyntheticWorld::at(0, 0, 0), T_b = SyntheticWorld::at(0.3, 0.1, to_radians(1.0));
+  const SurfaceCloud a(thin_scan(T_a)), b(thin_scan(T_b, 2));
+  pcl::PointCloud<pcl::PointXYZ>::Ptr pa(new pcl::PointCloud<pcl::PointXYZ>), pb(new pcl::PointCloud<pcl::PointXYZ>);
+  for (const auto& [cloud, target] : {std::pair{&a, pa}, {&b, pb}})
+    for (const auto& p : cloud->points()) target->push_back({p.x(), p.y(), p.z()});
+  pcl::GeneralizedIterativeClosestPoint<pcl::PointXYZ, pcl::PointXYZ> oracle;
+  oracle.setInputTarget(pa);
+  oracle.setInputSource(pb);
+  oracle.setMaxCorrespondenceDistance(1.0);
+  pcl::PointCloud<pcl::PointXYZ> unused;
+  oracle.align(unused);
+  const Pose T_oracle(oracle.getFinalTransformation().cast<double>()), T_truth = T_a.inverse() * T_b;
+  const Pose T =
+      align_icp(a, b.points(), Pose::Identity(), {.coarse_m = 1.0, .source_normals = b.normals()}).T_target_source;
+  EXPECT_LT(error_m(T, T_oracle), 0.05);
+  EXPECT_LT(error_deg(T, T_oracle), 0.2);
+  EXPECT_LT(error_m(T, T_truth), 0.05);
+}
+
+TEST(Icp, InformationIsSmallAlongACorridor) {
+  std::vector<Point> corridor, room;
+  for (float x = -20.f; x <= 20.f; x += 0.25f)
+    for (float z = 0.f; z <= 3.f; z += 0.25f)
+      for (const float y : {-2.f, 2.f}) corridor.push_back({x, y, z, 0.f});
+  for (float x = -20.f; x <= 20.f; x += 0.25f)
+    for (float y = -2.f; y <= 2.f; y += 0.25f) corridor.push_back({x, y, 0.f, 0.f});
+  room = corridor;
+  for (float y = -2.f; y <= 2.f; y += 0.25f)
+    for (float z = 0.f; z <= 3.f; z += 0.25f) room.push_back({15.f, y, z, 0.f});
+  const auto information = [](const std::vector<Point>& points, const Pose& T) {
+    const SurfaceCloud cloud(thin(points, {}, 0.5));
+    std::vector<Eigen::Vector3f> seen;  // by a sensor that stands elsewhere and looks another way
+    for (const auto& p : cloud.points()) seen.push_back((T.inverse() * p.cast<double>()).cast<float>());
+    return align_icp(cloud, seen, T).information;
+  };
+  const Matrix6 open = information(corridor, Pose::Identity()), closed = information(room, Pose::Identity());
+  EXPECT_LT(open(0, 0), 0.05 * open(1, 1)) << "nothing fixes the way along x";
+  EXPECT_GT(closed(0, 0), 5.0 * open(0, 0)) << "the wall ahead does";
+  // Seen by a sensor turned to the left, the corridor runs along its y.
+  const Matrix6 turned = information(corridor, planar_pose(3, 0, kPi / 2));
+  EXPECT_LT(turned(1, 1), 0.05 * turned(0, 0));
+}
+
 TEST(Icp, OfAScanWithItselfIsTheIdentity) {
   const SurfaceCloud a(thin_scan(SyntheticWorld::at(0, 0, 0)));
-  const IcpResult result = align_icp(a, a, Pose::Identity());
+  const IcpResult result = align_icp(a, a.points(), Pose::Identity());
   EXPECT_TRUE(result.converged);
   EXPECT_LT(error_m(result.T_target_source, Pose::Identity()), 1e-6);
   const Agreement agreement = measure_agreement(a, a, Pose::Identity(), 0.4);
@@ -186,8 +231,8 @@ TEST(Icp, TooLittleToAlignDoesNotConverge) {
   const SurfaceCloud a(thin_scan(SyntheticWorld::at(0, 0, 0)));
   const SurfaceCloud nothing(ThinCloud{}), one(thin(std::vector<Point>{{1, 2, 3, 0}}, {}, 1.0));
   for (const SurfaceCloud* each : {&nothing, &one}) {
-    EXPECT_FALSE(align_icp(a, *each, Pose::Identity()).converged);
-    EXPECT_FALSE(align_icp(*each, a, Pose::Identity()).converged);
+    EXPECT_FALSE(align_icp(a, each->points(), Pose::Identity()).converged);
+    EXPECT_FALSE(align_icp(*each, a.points(), Pose::Identity()).converged);
     EXPECT_EQ(measure_agreement(a, *each, Pose::Identity(), 0.4).inlier_ratio, 0.0);
   }
 }

@@ -12,6 +12,7 @@
 
 #include <revisit/core/scan.hpp>
 #include <revisit/registration/seen_space.hpp>
+#include <revisit/registration/surface.hpp>
 
 namespace revisit {
 
@@ -31,14 +32,16 @@ struct ThinCloud {
 ThinCloud thin(std::span<const Point> points, std::span<const std::uint8_t> is_ground, double voxel_m);
 
 /// A thin cloud with what registration needs of it: normals and neighbours. Safe to share between threads.
-class SurfaceCloud {
+class SurfaceCloud final : public Surface {
  public:
   explicit SurfaceCloud(ThinCloud cloud);
-  ~SurfaceCloud();
+  ~SurfaceCloud() override;
   SurfaceCloud(SurfaceCloud&&) noexcept;
   SurfaceCloud& operator=(SurfaceCloud&&) noexcept;
 
   std::size_t size() const { return cloud_.points.size(); }
+  std::span<const Eigen::Vector3f> points() const { return cloud_.points; }
+  std::span<const Eigen::Vector3f> normals() const { return normals_; }
   const Eigen::Vector3f& point(std::size_t i) const { return cloud_.points[i]; }
   /// Unit normal, sign arbitrary; zero where fewer than five neighbours gave none.
   const Eigen::Vector3f& normal(std::size_t i) const { return normals_[i]; }
@@ -53,6 +56,7 @@ class SurfaceCloud {
   /// The nearest point; none where no point is nearer than the reach.
   std::optional<Neighbour> nearest(const Eigen::Vector3f& query,
                                    float squared_reach_m2 = std::numeric_limits<float>::infinity()) const;
+  bool nearest_patch(const Eigen::Vector3f& query, float squared_reach_m2, Patch& patch) const override;
 
  private:
   struct Grid;

@@ -12,38 +12,44 @@ namespace {
 
 template <typename... Values>
 std::string format(const char* pattern, Values... values) {
-  char text[128];
+  char text[160];
   std::snprintf(text, sizeof text, pattern, values...);
   return text;
 }
 
-std::string reason_to_refuse(const GeometricEvidence& evidence, bool converged, const GeometricOptions& options) {
-  const double translation_m = evidence.T_match_query.translation().norm();
+std::string reason_to_refuse(const GeometricEvidence& found, bool converged, const GeometricOptions& options) {
+  const LoopEvidence& evidence = found.evidence;
   if (evidence.inlier_ratio < options.min_inlier_ratio)
     return format("inlier ratio %.2f below %.2f", evidence.inlier_ratio, options.min_inlier_ratio);
-  if (evidence.free_space_agreement < options.min_free_space_agreement)
-    return format("the scans see through each other: agreement %.2f below %.2f", evidence.free_space_agreement,
-                  options.min_free_space_agreement);
-  if (evidence.intensity_correlation && *evidence.intensity_correlation < options.min_intensity_correlation)
-    return format("intensities differ: correlation %.2f below %.2f", *evidence.intensity_correlation,
-                  options.min_intensity_correlation);
+  if (found.probability < options.min_probability)
+    return format("probability %.3f below %.3f (inliers %.2f; free space %.2f; intensity %.2f; rmse %.2f m)",
+                  found.probability, options.min_probability, evidence.inlier_ratio, evidence.free_space_agreement,
+                  evidence.intensity_agreement.value_or(0.0), evidence.rmse_m);
   if (!converged) return "registration did not converge";
-  if (translation_m > options.max_translation_m)
-    return format("translation %.1f m above %.1f m", translation_m, options.max_translation_m);
+  if (evidence.distance_m > options.max_translation_m)
+    return format("translation %.1f m above %.1f m", evidence.distance_m, options.max_translation_m);
   return {};
 }
 
-GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& query, const Pose& T_guess_match_query,
+GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& query, const CandidateView& view,
                                 const GeometricOptions& options) {
-  const IcpResult icp = align_icp(match, query, T_guess_match_query, options.overhead_search ? 2.0 : 4.0);
+  const IcpResult icp =
+      align_icp(match, query.points(), view.T_guess_match_query, {.coarse_m = options.overhead_search ? 2.0 : 4.0});
   const Agreement agreement = measure_agreement(match, query, icp.T_target_source, options.inlier_distance_m);
   GeometricEvidence evidence;
   evidence.T_match_query = icp.T_target_source;
   evidence.icp_iterations = icp.iterations;
-  evidence.inlier_ratio = agreement.inlier_ratio;
-  evidence.free_space_agreement = agreement.free_space_agreement;
-  evidence.intensity_correlation = agreement.intensity_correlation;
-  evidence.rmse_m = agreement.rmse_m;
+  evidence.information = icp.information;
+  LoopEvidence& all = evidence.evidence;
+  all.inlier_ratio = agreement.inlier_ratio;
+  all.free_space_agreement = agreement.free_space_agreement;
+  if (agreement.intensity_correlation)
+    all.intensity_agreement = *agreement.intensity_correlation / view.usual_intensity_correlation;
+  all.rmse_m = agreement.rmse_m;
+  all.overlap = view.overlap;
+  all.distance_m = icp.T_target_source.translation().norm();
+  evidence.log_odds = loop_log_odds(all) + view.prior_log_odds;
+  evidence.probability = probability_of(evidence.log_odds);
   evidence.reason = reason_to_refuse(evidence, icp.converged, options);
   evidence.consistent = evidence.reason.empty();
   return evidence;
@@ -51,14 +57,14 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
 
 }  // namespace
 
-GeometricEvidence check_geometric(const ScanGeometry& match, const ScanGeometry& query, const Pose& T_guess_match_query,
+GeometricEvidence check_geometric(const ScanGeometry& match, const ScanGeometry& query, const CandidateView& view,
                                   const GeometricOptions& options) {
   std::optional<GeometricEvidence> best;
   const auto consider = [&](GeometricEvidence evidence, const std::optional<FeatureAlignment>& features) {
     evidence.from_features = features.has_value();
     const std::size_t matches = features ? features->matches : best ? best->feature_matches : 0;
     const std::size_t inliers = features ? features->inliers : best ? best->feature_inliers : 0;
-    if (!best || evidence.consistent || evidence.inlier_ratio > best->inlier_ratio) best = evidence;
+    if (!best || evidence.consistent || evidence.evidence.inlier_ratio > best->evidence.inlier_ratio) best = evidence;
     best->feature_matches = matches;
     best->feature_inliers = inliers;
   };
@@ -68,9 +74,11 @@ GeometricEvidence check_geometric(const ScanGeometry& match, const ScanGeometry&
       const auto features = align_features(match.surface(), match.features(options.feature_radius_m), query.surface(),
                                            query.features(options.feature_radius_m));
       if (!features) continue;
-      consider(register_from(match.surface(), query.surface(), features->T_target_source, options), features);
+      CandidateView from = view;
+      from.T_guess_match_query = features->T_target_source;
+      consider(register_from(match.surface(), query.surface(), from, options), features);
     } else {
-      consider(register_from(match.surface(), query.surface(), T_guess_match_query, options), std::nullopt);
+      consider(register_from(match.surface(), query.surface(), view, options), std::nullopt);
     }
     if (best->consistent) break;
   }

@@ -7,16 +7,16 @@
 #include <revisit/config/parameters.hpp>
 #include <revisit/core/loop.hpp>
 #include <revisit/registration/feature_alignment.hpp>
+#include <revisit/verification/loop_probability.hpp>
 
 namespace revisit {
 
 /// What registration says about a candidate.
 struct GeometricEvidence {
-  Pose T_match_query = Pose::Identity();        ///< best registration found, accepted or not
-  double inlier_ratio = 0.0;                    ///< smaller of both directions
-  double free_space_agreement = 0.0;            ///< smaller of both directions
-  std::optional<double> intensity_correlation;  ///< none where intensities are all alike
-  double rmse_m = 0.0;
+  Pose T_match_query = Pose::Identity();     ///< best registration found, accepted or not
+  Matrix6 information = Matrix6::Zero();     ///< of the pose, as in LoopConstraint
+  LoopEvidence evidence;                     ///< what speaks for it
+  double log_odds = 0.0, probability = 0.0;  ///< that follow from it and from the prior
   int icp_iterations = 0;
   std::size_t feature_matches = 0, feature_inliers = 0;  ///< FPFH; 0 where it found no transform
   bool from_features = false;  ///< ICP started from FPFH's transform, not from the descriptor's yaw
@@ -24,11 +24,21 @@ struct GeometricEvidence {
   std::string reason;  ///< why not consistent
 };
 
-/// Geometric consistency (paper, section III-D): registers the query onto the match by ICP, from a guess (the
-/// yaw that the descriptors agreed on, or what the overhead search found); with features_fallback, from FPFH's
+/// What is known of a candidate before it is registered.
+struct CandidateView {
+  Pose T_guess_match_query =
+      Pose::Identity();  ///< the yaw that the descriptors agreed on, or the overhead search's pose
+  double overlap = 0.8;  ///< of both scans seen from overhead; as usual, where nobody looked
+  /// The correlation of intensities that consecutive scans show with this sensor.
+  double usual_intensity_correlation = 0.95;
+  double prior_log_odds = 0.0;  ///< what else makes it likely: a neighbour in time that was accepted
+};
+
+/// Geometric consistency (paper, section III-D): registers the query onto the match by ICP, from the guess; with
+/// features_fallback, from FPFH's
 /// transform where that is not consistent; with features_first, the other way round. Judges the better of both.
 /// Deterministic; one thread a scan.
-GeometricEvidence check_geometric(const ScanGeometry& match, const ScanGeometry& query, const Pose& T_guess_match_query,
+GeometricEvidence check_geometric(const ScanGeometry& match, const ScanGeometry& query, const CandidateView& view,
                                   const GeometricOptions& options);
 
 }  // namespace revisit

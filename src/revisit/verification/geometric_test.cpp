@@ -20,7 +20,7 @@ ScanGeometry scan_at(unsigned world, const Pose& T_world_lidar) {
 TEST(GeometricConsistency, ARevisitGivesItsPose) {
   const Pose T_match = SyntheticWorld::at(0, 0, 0), T_query = SyntheticWorld::at(2, 1, to_radians(175.0));
   ScanGeometry match = scan_at(31, T_match), query = scan_at(31, T_query);
-  const GeometricEvidence evidence = check_geometric(match, query, planar_pose(0, 0, to_radians(180.0)), {});
+  const GeometricEvidence evidence = check_geometric(match, query, {planar_pose(0, 0, to_radians(180.0))}, {});
   ASSERT_TRUE(evidence.consistent) << evidence.reason;
   const Pose error = (T_match.inverse() * T_query).inverse() * evidence.T_match_query;
   EXPECT_LT(error.translation().norm(), 0.1);
@@ -31,10 +31,10 @@ TEST(GeometricConsistency, ARevisitGivesItsPose) {
 TEST(GeometricConsistency, FeaturesSaveAWrongYaw) {
   const Pose T_match = SyntheticWorld::at(0, 0, 0), T_query = SyntheticWorld::at(2, 1, to_radians(100.0));
   ScanGeometry match = scan_at(31, T_match), query = scan_at(31, T_query);
-  EXPECT_FALSE(check_geometric(match, query, planar_pose(0, 0, 0.0), {}).consistent);
+  EXPECT_FALSE(check_geometric(match, query, {planar_pose(0, 0, 0.0)}, {}).consistent);
   GeometricOptions options;
   options.features_fallback = true;
-  const GeometricEvidence evidence = check_geometric(match, query, planar_pose(0, 0, 0.0), options);
+  const GeometricEvidence evidence = check_geometric(match, query, {planar_pose(0, 0, 0.0)}, options);
   ASSERT_TRUE(evidence.consistent) << evidence.reason;
   EXPECT_TRUE(evidence.from_features);
   EXPECT_GT(evidence.feature_inliers, 9u);
@@ -47,7 +47,7 @@ TEST(GeometricConsistency, ThePapersOrderStartsFromFeatures) {
   ScanGeometry match = scan_at(31, T_match), query = scan_at(31, T_query);
   GeometricOptions options;
   options.features_first = true;
-  const GeometricEvidence evidence = check_geometric(match, query, planar_pose(0, 0, to_radians(100.0)), options);
+  const GeometricEvidence evidence = check_geometric(match, query, {planar_pose(0, 0, to_radians(100.0))}, options);
   ASSERT_TRUE(evidence.consistent) << evidence.reason;
   EXPECT_TRUE(evidence.from_features) << "though the yaw was right";
 }
@@ -55,7 +55,7 @@ TEST(GeometricConsistency, ThePapersOrderStartsFromFeatures) {
 TEST(GeometricConsistency, AnotherPlaceIsRefused) {
   for (const unsigned other : {32u, 33u, 34u}) {
     ScanGeometry match = scan_at(31, SyntheticWorld::at(0, 0, 0)), query = scan_at(other, SyntheticWorld::at(0, 0, 0));
-    const GeometricEvidence evidence = check_geometric(match, query, planar_pose(0, 0, 0.0), {});
+    const GeometricEvidence evidence = check_geometric(match, query, {planar_pose(0, 0, 0.0)}, {});
     EXPECT_FALSE(evidence.consistent);
     EXPECT_NE(evidence.reason.find("inlier ratio"), std::string::npos) << evidence.reason;
   }
@@ -65,15 +65,15 @@ TEST(GeometricConsistency, TheFarthestTranslationIsKept) {
   ScanGeometry match = scan_at(31, SyntheticWorld::at(0, 0, 0)), query = scan_at(31, SyntheticWorld::at(2, 0, 0));
   GeometricOptions options;
   options.max_translation_m = 1.0;
-  const GeometricEvidence evidence = check_geometric(match, query, planar_pose(0, 0, 0.0), options);
+  const GeometricEvidence evidence = check_geometric(match, query, {planar_pose(0, 0, 0.0)}, options);
   EXPECT_FALSE(evidence.consistent);
   EXPECT_NE(evidence.reason.find("translation 2.0 m above 1.0 m"), std::string::npos) << evidence.reason;
 }
 
 TEST(GeometricConsistency, NothingToRegister) {
   ScanGeometry match = scan_at(31, SyntheticWorld::at(0, 0, 0)), nothing{ThinCloud{}};
-  EXPECT_FALSE(check_geometric(match, nothing, planar_pose(0, 0, 0.0), {}).consistent);
-  EXPECT_FALSE(check_geometric(nothing, match, planar_pose(0, 0, 0.0), {}).consistent);
+  EXPECT_FALSE(check_geometric(match, nothing, {planar_pose(0, 0, 0.0)}, {}).consistent);
+  EXPECT_FALSE(check_geometric(nothing, match, {planar_pose(0, 0, 0.0)}, {}).consistent);
 }
 
 }  // namespace

@@ -1,0 +1,94 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Learns the coefficients of src/revisit/verification/loop_probability.cpp. Needs numpy.
+
+usage: scripts/learn_probability.py FOLDER [FOLDER ...]
+Each folder is written by `revisit detect --evidence --geometric.min_overlap 0.35 --geometric.candidates 5` over a
+recording with exact poses. Every recording weighs the same, and in each the right poses as much as the wrong ones.
+Prints the coefficients, then, for each recording, what a model learnt on all the others says about it."""
+import csv
+import pathlib
+import sys
+
+import numpy as np
+
+RIGHT_M, RIGHT_DEG = 0.5, 3.0  # docs/evaluation.md
+WRONG_M, WRONG_DEG = 2.0, 10.0  # in between, the place is right and the pose poor: nothing is learnt from it
+NAMES = ["inlier_ratio", "free_space", "intensity", "rmse_m", "overlap", "distance", "distance_root", "constant"]
+WITHOUT_INTENSITY = [0, 1, 5, 6]
+
+
+def matrix(x, y, z, qx, qy, qz, qw):
+    T = np.eye(4)
+    T[:3, :3] = [[1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy - qz * qw), 2 * (qx * qz + qy * qw)],
+                 [2 * (qx * qy + qz * qw), 1 - 2 * (qx * qx + qz * qz), 2 * (qy * qz - qx * qw)],
+                 [2 * (qx * qz - qy * qw), 2 * (qy * qz + qx * qw), 1 - 2 * (qx * qx + qy * qy)]]
+    T[:3, 3] = x, y, z
+    return T
+
+
+def load(folder):
+    """Evidence (one row a registered candidate), whether its pose is right, and its query."""
+    poses = [matrix(*row[1:]) for row in np.loadtxt(folder / "poses.tum")]
+    X, right, queries = [], [], []
+    with open(folder / "evidence.csv", encoding="ascii") as stream:
+        for row in csv.DictReader(stream):
+            free, inliers = float(row["free_space_agreement"]), float(row["inlier_ratio"])
+            if inliers < 0.35 or free < 0.85 or not row["intensity_agreement"]:
+                continue  # nobody would take these
+            error = np.linalg.inv(np.linalg.inv(poses[int(row["match"])]) @ poses[int(row["query"])]) @ matrix(
+                *(float(row[k]) for k in ("tx", "ty", "tz", "qx", "qy", "qz", "qw")))
+            angle = np.degrees(np.arccos(np.clip((np.trace(error[:3, :3]) - 1) / 2, -1, 1)))
+            distance = min(float(row["distance_m"]), 12.0) / 10.0
+            off_m = np.linalg.norm(error[:3, 3])
+            is_right = off_m <= RIGHT_M and angle <= RIGHT_DEG
+            if not is_right and off_m < WRONG_M and angle < WRONG_DEG:
+                continue
+            X.append([inliers, -np.log(1.004 - free), float(row["intensity_agreement"]), float(row["rmse_m"]),
+                      float(row["overlap"]), distance, distance**0.5])
+            right.append(is_right)
+            queries.append(int(row["query"]))
+    return np.array(X), np.array(right), np.array(queries)
+
+
+def learn(recordings, columns):
+    """Logistic regression, slightly regularised, by Newton's method."""
+    X = np.concatenate([r[0][:, columns] for r in recordings])
+    y = np.concatenate([r[1] for r in recordings]).astype(float)
+    # A recording without wrong poses gives no weight to them.
+    w = np.concatenate([np.where(r[1], 500 / max(30, r[1].sum()), 500 / max(30, (~r[1]).sum())) for r in recordings])
+    mean, spread = X.mean(0), X.std(0)
+    Z = np.c_[(X - mean) / spread, np.ones(len(X))]
+    penalty = 1e-3 * w.sum() * np.diag([1.0] * len(columns) + [0.0])
+    b = np.zeros(Z.shape[1])
+    for _ in range(50):
+        p = 1 / (1 + np.exp(-Z @ b))
+        H = (Z * (w * p * (1 - p) + 1e-12)[:, None]).T @ Z + penalty
+        b -= np.linalg.solve(H, Z.T @ (w * (p - y)) + penalty @ b)
+    slopes = b[:-1] / spread
+    return slopes, b[-1] - slopes @ mean
+
+
+def main():
+    folders = [pathlib.Path(a) for a in sys.argv[1:]]
+    if not folders:
+        sys.exit(__doc__)
+    recordings = [load(f) for f in folders]
+    for title, columns in (("with intensity", list(range(7))), ("without", WITHOUT_INTENSITY)):
+        slopes, constant = learn(recordings, columns)
+        print(title, {NAMES[c]: round(float(s), 3) for c, s in zip(columns, slopes)}, "constant", round(constant, 3))
+        for i, (folder, (X, right, queries)) in enumerate(zip(folders, recordings)):
+            if len(folders) == 1:
+                break
+            s, c = learn(recordings[:i] + recordings[i + 1:], columns)
+            odds, own = X[:, columns] @ s + c, X[:, columns] @ slopes + constant
+            found = {q: max(odds[right & (queries == q)]) for q in set(queries[right])}
+            best = np.array(list(found.values()))
+            taken = [f"{(best > t).mean():.3f}/{(odds[~right] > t).sum()}" for t in (0.0, 1.0, 2.0, 3.0)]
+            print(f"  {folder.name}: {right.sum()} right, {(~right).sum()} wrong; learnt on the others, queries found / "
+                  f"wrong ones taken at log odds 0, 1, 2, 3: {', '.join(taken)}; most of a wrong one "
+                  f"{odds[~right].max(initial=-99):.2f}, {own[~right].max(initial=-99):.2f} learnt on all")
+
+
+if __name__ == "__main__":
+    main()

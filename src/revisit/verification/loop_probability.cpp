@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/verification/loop_probability.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace revisit {
+namespace {
+
+struct Coefficients {
+  double inlier_ratio, free_space, intensity, rmse_m, overlap, distance, distance_root, constant;
+};
+
+// Learnt by scripts/learn_probability.py.
+constexpr Coefficients kWithIntensity{13.937, 1.930, 20.652, -35.808, 7.654, 5.215, 9.040, -37.472};
+constexpr Coefficients kWithoutIntensity{18.236, 1.977, 0.0, 0.0, 0.0, 6.359, 4.433, -22.517};
+constexpr double kFarthest_m = 12.0;  // beyond, nothing was learnt
+
+}  // namespace
+
+double loop_log_odds(const LoopEvidence& evidence) {
+  const Coefficients& c = evidence.intensity_agreement ? kWithIntensity : kWithoutIntensity;
+  // Disagreement counts by its order of magnitude: one point in a hundred seen through, or three.
+  const double free_space = -std::log(1.004 - std::clamp(evidence.free_space_agreement, 0.0, 1.0));
+  const double distance = std::min(evidence.distance_m, kFarthest_m) / 10.0;  // in tens of metres
+  return c.constant + c.inlier_ratio * evidence.inlier_ratio + c.free_space * free_space +
+         c.intensity * evidence.intensity_agreement.value_or(0.0) + c.rmse_m * evidence.rmse_m +
+         c.overlap * evidence.overlap + c.distance * distance + c.distance_root * std::sqrt(distance);
+}
+
+double probability_of(double log_odds) { return 1.0 / (1.0 + std::exp(-log_odds)); }
+
+}  // namespace revisit

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+
+namespace revisit {
+
+/// What speaks for or against a registered pair of scans showing the same place at the pose that was found.
+struct LoopEvidence {
+  double inlier_ratio = 0.0;          ///< smaller of both directions
+  double free_space_agreement = 0.0;  ///< smaller of both directions
+  /// Correlation of intensities, as a share of that between consecutive scans; none where intensities say nothing.
+  std::optional<double> intensity_agreement;
+  double rmse_m = 0.0;                ///< point-to-plane, over the inliers
+  double overlap = 0.0;               ///< of both scans seen from overhead
+  double distance_m = 0.0;            ///< between both sensors: farther apart, less fits even at the same place
+};
+
+/// The log odds that the pose is right (within 0.5 m and 3 degrees), were right and wrong ones equally many: a logistic
+/// model whose coefficients were learnt on recordings that no reported figure uses (docs/accuracy.md says on which and
+/// how). Holds for the shipped voxel size and inlier distance. What is known besides is added (Bayes).
+double loop_log_odds(const LoopEvidence& evidence);
+
+double probability_of(double log_odds);
+
+}  // namespace revisit
