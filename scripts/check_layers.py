@@ -34,6 +34,7 @@ DOORS = {
     "xxhash": {"src/revisit/retrieval"},
     "faiss/": {"benchmarks"},
     "nanoflann": {"benchmarks"},
+    "tsl/": {"src/revisit/odometry"},
     "toml++": {"src/revisit/config"},
     "nlohmann/": {"src/revisit/io", "src/revisit/config", "apps"},
     "embree": {"src/revisit/simulation"},

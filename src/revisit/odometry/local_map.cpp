@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/odometry/local_map.hpp>
+
+#include <cmath>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+
+#include <tsl/robin_map.h>
+#include <Eigen/Eigenvalues>
+
+namespace revisit {
+namespace {
+
+using Index = Eigen::Vector3i;
+
+struct IndexHash {
+  // Teschner et al., "Optimized Spatial Hashing for Collision Detection of Deformable Objects", 2003.
+  std::size_t operator()(const Index& v) const {
+    const auto u = v.cast<std::uint32_t>();
+    return (u.x() * 73856093u) ^ (u.y() * 19349669u) ^ (u.z() * 83492791u);
+  }
+};
+
+// Sums over points, taken from a place near them so that floats suffice.
+struct Sums {
+  Eigen::Vector3f origin = Eigen::Vector3f::Zero(), first = Eigen::Vector3f::Zero();
+  Eigen::Matrix3f second = Eigen::Matrix3f::Zero();
+  std::uint32_t count = 0;
+
+  void add(const Eigen::Vector3f& p) {
+    if (count == 0) origin = p;
+    const Eigen::Vector3f d = p - origin;
+    first += d;
+    second.noalias() += d * d.transpose();
+    ++count;
+  }
+  void add(const Sums& other) {
+    const Eigen::Vector3f d = other.origin - origin;
+    const auto n = static_cast<float>(other.count);
+    second += other.second + other.first * d.transpose() + d * other.first.transpose() + n * d * d.transpose();
+    first += other.first + n * d;
+    count += other.count;
+  }
+  Eigen::Vector3f mean() const { return origin + first / static_cast<float>(count); }
+
+  // The normal of the plane that the points lie on; zero where they lie on none.
+  Eigen::Vector3f normal() const {
+    constexpr std::uint32_t kFewest = 5;
+    constexpr float kFlat = 0.1f;   // least over middle spread, at most
+    constexpr float kWide = 0.02f;  // middle over largest spread, at least: a line has no normal
+    if (count < kFewest) return Eigen::Vector3f::Zero();
+    const Eigen::Vector3f centre = first / static_cast<float>(count);
+    const Eigen::Matrix3f covariance = second / static_cast<float>(count) - centre * centre.transpose();
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
+    solver.computeDirect(covariance);
+    const Eigen::Vector3f spread = solver.eigenvalues();
+    if (spread[0] > kFlat * spread[1] || spread[1] < kWide * spread[2]) return Eigen::Vector3f::Zero();
+    return solver.eigenvectors().col(0);
+  }
+};
+
+struct Voxel {
+  static constexpr std::uint32_t kMost = 100;  ///< points; more tell nothing new
+  Sums sums;
+  Surface::Patch patch;
+  bool is_stale = false;  ///< points were added since the patch was found
+};
+
+}  // namespace
+
+struct LocalMap::Voxels {
+  tsl::robin_map<Index, Voxel, IndexHash> map;
+  std::vector<Index> stale;
+
+  // The surface within a voxel; where its points lie on none, the one that its neighbours' points lie on with them:
+  // the lines of a sparse sensor are a voxel apart.
+  void find_surface(const Index& index) {
+    Voxel& voxel = map.find(index).value();
+    voxel.is_stale = false;
+    voxel.patch = {voxel.sums.mean(), voxel.sums.normal()};
+    if (!voxel.patch.normal.isZero()) return;
+    Sums around = voxel.sums;
+    for (int k = 0; k < 27; ++k) {
+      const Index step(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+      if (step.isZero()) continue;
+      if (const auto found = map.find(index + step); found != map.end()) around.add(found->second.sums);
+    }
+    voxel.patch.normal = around.normal();
+  }
+};
+
+LocalMap::LocalMap(double voxel_m, double reach_m)
+    : voxel_m_(static_cast<float>(voxel_m)),
+      reach_m_(static_cast<float>(reach_m)),
+      voxels_(std::make_unique<Voxels>()) {
+  if (!(voxel_m > 0.0) || !(reach_m > 0.0))
+    throw std::invalid_argument("a map of voxels of " + std::to_string(voxel_m) + " m up to " +
+                                std::to_string(reach_m) + " m; allowed: both above 0");
+}
+
+LocalMap::~LocalMap() = default;
+LocalMap::LocalMap(LocalMap&&) noexcept = default;
+LocalMap& LocalMap::operator=(LocalMap&&) noexcept = default;
+
+std::size_t LocalMap::voxels() const { return voxels_->map.size(); }
+
+void LocalMap::add(std::span<const Eigen::Vector3f> points) {
+  auto& stale = voxels_->stale;
+  stale.clear();
+  for (const Eigen::Vector3f& p : points) {
+    const Index index = (p / voxel_m_).array().floor().cast<int>();
+    Voxel& voxel = voxels_->map[index];
+    if (voxel.sums.count >= Voxel::kMost) continue;
+    voxel.sums.add(p);
+    if (!voxel.is_stale) stale.push_back(index);
+    voxel.is_stale = true;
+  }
+  for (const Index& index : stale) voxels_->find_surface(index);
+}
+
+void LocalMap::forget_far_from(const Eigen::Vector3f& centre) {
+  auto& map = voxels_->map;
+  for (auto it = map.begin(); it != map.end();)
+    it = (it->second.sums.origin - centre).squaredNorm() > reach_m_ * reach_m_ ? map.erase(it) : std::next(it);
+}
+
+bool LocalMap::nearest_patch(const Eigen::Vector3f& query, float squared_reach_m2, Patch& patch) const {
+  // Of each axis, the voxel of the query and its neighbour on the nearer side.
+  const Index low = (query / voxel_m_ - Eigen::Vector3f::Constant(0.5f)).array().floor().cast<int>();
+  const Voxel* best = nullptr;
+  for (int corner = 0; corner < 8; ++corner) {
+    const auto found = voxels_->map.find(low + Index(corner & 1, corner >> 1 & 1, corner >> 2));
+    if (found == voxels_->map.end() || found->second.patch.normal.isZero()) continue;
+    const float d2 = (found->second.patch.point - query).squaredNorm();
+    if (d2 >= squared_reach_m2) continue;
+    squared_reach_m2 = d2;
+    best = &found->second;
+  }
+  if (best == nullptr) return false;
+  patch = best->patch;
+  return true;
+}
+
+}  // namespace revisit

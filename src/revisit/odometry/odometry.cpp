@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/odometry/odometry.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <revisit/registration/icp.hpp>
+#include <revisit/registration/surface_cloud.hpp>
+
+namespace revisit {
+namespace {
+
+constexpr double kPartsOfAVoxel = 2.0;  // along an edge: points that the map is given
+constexpr double kForget = 0.1;          // share of the newest in a running mean
+constexpr double kFarSearch_m = 2.0;     // where little is known of the motion
+constexpr double kFewestMatched = 0.3, kUsualSpread = 0.2;
+constexpr double kLongestGap_s = 1.0;  // beyond, the motion before says nothing about the motion now
+
+double median_range_m(std::span<const Point> points) {
+  std::vector<float> ranges;
+  ranges.reserve(points.size());
+  for (const Point& p : points) ranges.push_back(std::hypot(p.x, p.y, p.z));
+  if (ranges.empty()) return 10.0;
+  const auto middle = ranges.begin() + static_cast<std::ptrdiff_t>(ranges.size() / 2);
+  std::nth_element(ranges.begin(), middle, ranges.end());
+  return static_cast<double>(*middle);
+}
+
+std::vector<Eigen::Vector3f> in_map(const std::vector<Eigen::Vector3f>& points, const Pose& T_odom_lidar) {
+  std::vector<Eigen::Vector3f> moved(points.size());
+  const Eigen::Isometry3f T = T_odom_lidar.cast<float>();
+  std::transform(points.begin(), points.end(), moved.begin(), [&](const Eigen::Vector3f& p) { return T * p; });
+  return moved;
+}
+
+}  // namespace
+
+std::optional<Twist> Odometry::expected(double stamp_s) const {
+  const double gap_s = stamp_s - last_stamp_s_;
+  return gap_s > 0.0 && gap_s <= kLongestGap_s ? motion_ : std::nullopt;
+}
+
+void Odometry::start(double stamp_s, std::span<const Point> points) {
+  range_m_ = median_range_m(points);
+  constexpr double kVoxelsToTheMedian = 12.0, kSmallest_m = 0.25, kLargest_m = 1.0, kReach_m = 100.0;
+  map_.emplace(std::clamp(range_m_ / kVoxelsToTheMedian, kSmallest_m, kLargest_m), kReach_m);
+  last_stamp_s_ = stamp_s;
+}
+
+double Odometry::search_radius_m() const {
+  constexpr double kLeastVoxels = 1.0, kSigmas = 3.0;
+  constexpr int kScansToLearn = 10;
+  if (scans_ < kScansToLearn) return kFarSearch_m;
+  return std::clamp(kSigmas * std::sqrt(squared_surprise_m2_), kLeastVoxels * map_->voxel_m(), kFarSearch_m);
+}
+
+OdometryStep Odometry::find(double stamp_s, std::span<const Point> points,
+                            const std::optional<Pose>& T_before_now) const {
+  OdometryStep step;
+  step.T_odom_lidar = T_odom_lidar_;
+  if (!map_) {
+    step.is_tracked = true;  // wherever it is: there the map begins
+    return step;
+  }
+  const double voxel_m = map_->voxel_m();
+  const ThinCloud cloud = thin(points, {}, voxel_m);
+  const std::optional<Twist> twist = expected(stamp_s);
+  const Pose T_moved = T_before_now ? *T_before_now
+                       : twist      ? motion_after(*twist, stamp_s - last_stamp_s_)
+                                    : Pose::Identity();
+  const auto align = [&](double radius_m, const Pose& T_guess) {
+    IcpResult icp = align_icp(*map_, cloud.points, T_odom_lidar_ * T_guess,
+                              {.coarse_m = radius_m,
+                               .fine_m = std::min(radius_m, 0.3 * voxel_m + 0.1),
+                               .least_reach_m = voxel_m,
+                               .settled_m = 2e-3});
+    constexpr double kSteady_m = 0.02;  // rocking between two voxels
+    icp.converged = icp.converged || (icp.information(0, 0) > 0.0 && icp.last_step_m < kSteady_m);
+    return icp;
+  };
+  const auto fits = [&](const IcpResult& icp) {
+    return icp.converged && icp.matched >= std::max(kFewestMatched, usual_match_ - kUsualSpread);
+  };
+  IcpResult icp = align(search_radius_m(), T_moved);
+  // A turn or a jolt that was not foreseen, or the end of one.
+  for (const Pose& T_guess : {T_moved, Pose::Identity()}) {
+    if (fits(icp)) break;
+    const IcpResult other = align(kFarSearch_m, T_guess);
+    if (fits(other) || other.matched > icp.matched) icp = other;
+  }
+  step.matched = icp.matched;
+  step.is_tracked = fits(icp);
+  step.T_before_now = T_moved;
+  step.T_odom_lidar = T_odom_lidar_ * T_moved;
+  if (step.is_tracked) {
+    step.T_odom_lidar = icp.T_target_source;
+    step.T_before_now = T_odom_lidar_.inverse() * icp.T_target_source;
+    step.information = icp.information;
+    const Pose surprise = T_moved.inverse() * step.T_before_now;
+    step.surprise_m = surprise.translation().norm() + rotation_angle(surprise) * range_m_;
+  }
+  // Poses are made from poses scan after scan: what rounding does to a rotation must not build up.
+  step.T_odom_lidar.linear() = Eigen::Quaterniond(step.T_odom_lidar.linear()).normalized().toRotationMatrix();
+  return step;
+}
+
+void Odometry::accept(double stamp_s, std::span<const Point> points, const OdometryStep& step) {
+  const double gap_s = stamp_s - last_stamp_s_;
+  if (!map_) {
+    start(stamp_s, points);
+  } else {
+    const double share = std::max(kForget, 1.0 / scans_);
+    if (step.is_tracked) squared_surprise_m2_ += share * (step.surprise_m * step.surprise_m - squared_surprise_m2_);
+    usual_match_ += share * (step.matched - usual_match_);
+    motion_.reset();
+    if (gap_s > 0.0 && gap_s <= kLongestGap_s) motion_ = twist_of(step.T_before_now, gap_s);
+  }
+  T_odom_lidar_ = step.T_odom_lidar;
+  if (step.is_tracked)
+    map_->add(in_map(thin(points, {}, map_->voxel_m() / kPartsOfAVoxel).points, T_odom_lidar_));
+  map_->forget_far_from(T_odom_lidar_.translation().cast<float>());
+  last_stamp_s_ = stamp_s;
+  ++scans_;
+}
+
+OdometryStep Odometry::track(double stamp_s, std::span<const Point> points, const std::optional<Pose>& T_before_now) {
+  OdometryStep step = find(stamp_s, points, T_before_now);
+  accept(stamp_s, points, step);
+  return step;
+}
+
+}  // namespace revisit

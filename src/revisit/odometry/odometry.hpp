@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include <revisit/core/pose.hpp>
+#include <revisit/core/scan.hpp>
+#include <revisit/core/twist.hpp>
+#include <revisit/odometry/local_map.hpp>
+
+namespace revisit {
+
+/// Where one scan was found to be.
+struct OdometryStep {
+  Pose T_odom_lidar = Pose::Identity();  ///< at the scan's stamp; the first scan is the origin
+  Pose T_before_now = Pose::Identity();  ///< since the scan before
+  Matrix6 information = Matrix6::Zero();  ///< of T_before_now, as in LoopConstraint
+  double matched = 0.0;                   ///< share of the scan's surface points that met the map
+  double surprise_m = 0.0;                ///< how far the motion was from the one expected, of points at usual range
+  bool is_tracked = false;               ///< otherwise the pose is the one that was expected
+};
+
+/// Tracks a LiDAR against the map of what it saw lately. Nothing to tune: the map's voxels follow from how far the
+/// first scan sees, the search radius from how well the motion is foreseen. Scans come in the order of their stamps.
+/// Belongs to one thread at a time; deterministic, whatever the number of threads underneath.
+class Odometry {
+ public:
+  /// The motion during the coming scan, if it follows closely on the last: to undo its distortion with.
+  std::optional<Twist> expected(double stamp_s) const;
+
+  /// Finds the scan (filtered by range, undistorted) in the map. `T_before_now`, if there is one, is what wheels or
+  /// another odometry measured since the scan before: the guess, and the answer where the map gives none.
+  OdometryStep find(double stamp_s, std::span<const Point> points, const std::optional<Pose>& T_before_now = {}) const;
+  /// Goes on from there: the scan enters the map.
+  void accept(double stamp_s, std::span<const Point> points, const OdometryStep& step);
+  /// Both.
+  OdometryStep track(double stamp_s, std::span<const Point> points, const std::optional<Pose>& T_before_now = {});
+
+  const LocalMap* map() const { return map_ ? &*map_ : nullptr; }
+
+ private:
+  void start(double stamp_s, std::span<const Point> points);
+  double search_radius_m() const;
+
+  std::optional<LocalMap> map_;
+  Pose T_odom_lidar_ = Pose::Identity();
+  std::optional<Twist> motion_;
+  double last_stamp_s_ = 0.0, range_m_ = 0.0;
+  double squared_surprise_m2_ = 0.0;  ///< running mean of how far expectation was off
+  double usual_match_ = 0.0;          ///< running mean of the share that met the map
+  int scans_ = 0;
+};
+
+}  // namespace revisit

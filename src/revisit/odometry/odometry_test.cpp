@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/odometry/odometry.hpp>
+
+#include <gtest/gtest.h>
+
+#include "synthetic_world.hpp"
+
+namespace revisit {
+namespace {
+
+using testing_support::SyntheticWorld;
+
+// Along a bend, 0.6 m a scan.
+Pose on_the_way(int i) {
+  const double s = 0.6 * i, heading = 0.02 * i;
+  return SyntheticWorld::at(s, 0.2 * s * s / 20.0, heading);
+}
+
+std::vector<Point> seen_from(unsigned world, const Pose& T_world_lidar, unsigned noise) {
+  static const SyntheticWorld here(31), elsewhere(77);
+  return (world == 31 ? here : elsewhere).scan(T_world_lidar, {32, 600, -24.8, 5.0}, noise).points;
+}
+
+TEST(Odometry, FollowsABend) {
+  Odometry odometry;
+  Pose T_found = Pose::Identity();
+  for (int i = 0; i < 30; ++i) {
+    const OdometryStep step = odometry.track(0.1 * i, seen_from(31, on_the_way(i), static_cast<unsigned>(i)));
+    EXPECT_TRUE(step.is_tracked) << "scan " << i << ", matched " << step.matched;
+    T_found = step.T_odom_lidar;
+  }
+  const Pose error = (on_the_way(0).inverse() * on_the_way(29)).inverse() * T_found;
+  EXPECT_LT(error.translation().norm(), 0.01 * 0.6 * 29) << "1 % of the way";
+  EXPECT_LT(to_degrees(rotation_angle(error)), 0.5);
+}
+
+TEST(Odometry, SaysWhenItIsLostAndKeepsWhatWheelsSay) {
+  Odometry odometry;
+  for (int i = 0; i < 12; ++i) odometry.track(0.1 * i, seen_from(31, on_the_way(i), static_cast<unsigned>(i)));
+  // Somewhere else all at once, and then nothing to be seen at all.
+  const Pose T_wheels = planar_pose(0.6, 0.0, 0.02);
+  const double usual = odometry.find(1.2, seen_from(31, on_the_way(12), 12)).matched;
+  const OdometryStep lost = odometry.track(1.2, seen_from(77, SyntheticWorld::at(40, 30, 2.0), 1), T_wheels);
+  const OdometryStep blind = odometry.track(1.3, {}, T_wheels);
+  for (const OdometryStep& step : {lost, blind}) {
+    EXPECT_FALSE(step.is_tracked) << step.matched << " of " << usual;
+    EXPECT_TRUE(step.T_before_now.isApprox(T_wheels));
+  }
+}
+
+TEST(Odometry, AStandingStartAndTimesThatStandStill) {
+  Odometry odometry;
+  for (const double stamp_s : {5.0, 5.0, 4.0, 4.5}) {
+    const OdometryStep step = odometry.track(stamp_s, seen_from(31, on_the_way(0), 3));
+    EXPECT_TRUE(step.is_tracked);
+    EXPECT_LT(step.T_odom_lidar.translation().norm(), 0.01);
+  }
+  EXPECT_FALSE(odometry.expected(4.5)) << "no time has passed";
+  EXPECT_FALSE(odometry.expected(60.0)) << "too long a gap to foresee anything";
+  EXPECT_TRUE(odometry.expected(4.6));
+}
+
+}  // namespace
+}  // namespace revisit
