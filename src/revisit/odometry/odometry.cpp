@@ -12,8 +12,8 @@ namespace revisit {
 namespace {
 
 constexpr double kPartsOfAVoxel = 2.0;  // along an edge: points that the map is given
-constexpr double kForget = 0.1;          // share of the newest in a running mean
-constexpr double kFarSearch_m = 2.0;     // where little is known of the motion
+constexpr double kForget = 0.1;         // share of the newest in a running mean
+constexpr double kFarSearch_m = 2.0;    // where little is known of the motion
 constexpr double kFewestMatched = 0.3, kUsualSpread = 0.2;
 constexpr double kLongestGap_s = 1.0;  // beyond, the motion before says nothing about the motion now
 
@@ -117,8 +117,7 @@ void Odometry::accept(double stamp_s, std::span<const Point> points, const Odome
     if (gap_s > 0.0 && gap_s <= kLongestGap_s) motion_ = twist_of(step.T_before_now, gap_s);
   }
   T_odom_lidar_ = step.T_odom_lidar;
-  if (step.is_tracked)
-    map_->add(in_map(thin(points, {}, map_->voxel_m() / kPartsOfAVoxel).points, T_odom_lidar_));
+  if (step.is_tracked) map_->add(in_map(thin(points, {}, map_->voxel_m() / kPartsOfAVoxel).points, T_odom_lidar_));
   map_->forget_far_from(T_odom_lidar_.translation().cast<float>());
   last_stamp_s_ = stamp_s;
   ++scans_;

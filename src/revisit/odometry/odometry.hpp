@@ -13,12 +13,12 @@ namespace revisit {
 
 /// Where one scan was found to be.
 struct OdometryStep {
-  Pose T_odom_lidar = Pose::Identity();  ///< at the scan's stamp; the first scan is the origin
-  Pose T_before_now = Pose::Identity();  ///< since the scan before
+  Pose T_odom_lidar = Pose::Identity();   ///< at the scan's stamp; the first scan is the origin
+  Pose T_before_now = Pose::Identity();   ///< since the scan before
   Matrix6 information = Matrix6::Zero();  ///< of T_before_now, as in LoopConstraint
   double matched = 0.0;                   ///< share of the scan's surface points that met the map
   double surprise_m = 0.0;                ///< how far the motion was from the one expected, of points at usual range
-  bool is_tracked = false;               ///< otherwise the pose is the one that was expected
+  bool is_tracked = false;                ///< otherwise the pose is the one that was expected
 };
 
 /// Tracks a LiDAR against the map of what it saw lately. Nothing to tune: the map's voxels follow from how far the

@@ -12,8 +12,7 @@
 namespace revisit {
 namespace {
 
-constexpr int kOverheadReach_m = 6;    // a translation that retrieval may be off
-constexpr double kFollowsALoop = 2.0;  // log odds in favour of a candidate next to the loop of a scan just before
+constexpr int kOverheadReach_m = 6;  // a translation that retrieval may be off
 
 }  // namespace
 
@@ -162,7 +161,7 @@ void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
   const auto register_one = [&](Opinion& each) {
     ScanGeometry match(places_.at(each.candidate.match).cloud);
     CandidateView view{each.T_guess_match_query, each.overlap};
-    if (follows_a_loop(detection.frame, each.candidate.match)) view.prior_log_odds = kFollowsALoop;
+    view.prior_log_odds = what_neighbours_say(detection.frame, each.candidate.match);
     if (const auto usual = ego_motion_.usual_intensity_correlation()) view.usual_intensity_correlation = *usual;
     each.geometric = check_geometric(match, *query, view, parameters_.geometric);
     each.reason = each.geometric->reason;
@@ -193,9 +192,11 @@ void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
   detection.score = answer.score();
   detection.reason = answer.reason;
   detection.geometric = std::move(answer.geometric);
+  if (detection.geometric && detection.geometric->evidence.inlier_ratio >= parameters_.geometric.min_inlier_ratio) {
+    recent_answers_.push_back({detection.frame, answer.candidate.match, loop_log_odds(detection.geometric->evidence)});
+    if (recent_answers_.size() > kAnswersRemembered) recent_answers_.pop_front();
+  }
   if (detection.reason.empty()) {
-    recent_loops_.emplace_back(detection.frame, answer.candidate.match);
-    if (recent_loops_.size() > kLoopsRemembered) recent_loops_.pop_front();
     const GeometricEvidence& found = *detection.geometric;
     detection.loop =
         LoopConstraint{detection.frame,       answer.candidate.match, found.T_match_query, found.evidence.inlier_ratio,
@@ -203,13 +204,18 @@ void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
   }
 }
 
-bool LoopDetector::follows_a_loop(FrameId query, FrameId match) const {
+double LoopDetector::what_neighbours_say(FrameId query, FrameId match) const {
+  // Scans that follow each other see much the same: each counts for a part of what it says, and all for a limited sum.
   constexpr std::int64_t kRecent_frames = 10;
-  return std::any_of(recent_loops_.begin(), recent_loops_.end(), [&](const auto& loop) {
-    const std::int64_t since = query.value - loop.first.value;
-    return since <= kRecent_frames &&
-           std::abs(match.value - loop.second.value) <= parameters_.retrieval.separation_frames + 2 * since;
-  });
+  constexpr double kShare = 0.3, kMostAgainst = 1.0, kMostInFavour = 3.0;
+  double sum = 0.0;
+  for (const RecentAnswer& answer : recent_answers_) {
+    const std::int64_t since = query.value - answer.query.value;
+    if (since <= kRecent_frames &&
+        std::abs(match.value - answer.match.value) <= parameters_.retrieval.separation_frames + 2 * since)
+      sum += kShare * answer.log_odds;
+  }
+  return std::clamp(sum, -kMostAgainst, kMostInFavour);
 }
 
 void LoopDetector::look_from_overhead(OverheadSearch& overhead, Opinion& opinion) const {

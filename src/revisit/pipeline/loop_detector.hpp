@@ -90,8 +90,8 @@ class LoopDetector {
   };
 
   void verify(Detection& detection, const PreparedScan& prepared);
-  // Whether a scan shortly before the query was found next to the match.
-  bool follows_a_loop(FrameId query, FrameId match) const;
+  // Log odds in favour of the match that the scans shortly before give, which were found next to it or were not.
+  double what_neighbours_say(FrameId query, FrameId match) const;
   void look_from_overhead(OverheadSearch& overhead, Opinion& opinion) const;
   void check_temporal_and_scores(FrameId frame, Opinion& opinion) const;
   // The place among the answer's neighbours that the query stands nearest to, if it is another.
@@ -107,8 +107,12 @@ class LoopDetector {
   PlaceIndex index_;
   std::map<FrameId, Place> places_;
   EgoMotion ego_motion_;
-  static constexpr std::size_t kLoopsRemembered = 10;
-  std::deque<std::pair<FrameId, FrameId>> recent_loops_;                 ///< query and match of the last ones
+  struct RecentAnswer {
+    FrameId query, match;
+    double log_odds = 0.0;
+  };
+  static constexpr std::size_t kAnswersRemembered = 10;
+  std::deque<RecentAnswer> recent_answers_;
   std::deque<std::pair<FrameId, IntensityScanContext>> recent_queries_;  ///< the last N, for temporal consistency
 };
 

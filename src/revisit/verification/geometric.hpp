@@ -31,7 +31,7 @@ struct CandidateView {
   double overlap = 0.8;  ///< of both scans seen from overhead; as usual, where nobody looked
   /// The correlation of intensities that consecutive scans show with this sensor.
   double usual_intensity_correlation = 0.95;
-  double prior_log_odds = 0.0;  ///< what else makes it likely: a neighbour in time that was accepted
+  double prior_log_odds = 0.0;  ///< what else makes it likely: its neighbours in time
 };
 
 /// Geometric consistency (paper, section III-D): registers the query onto the match by ICP, from the guess; with

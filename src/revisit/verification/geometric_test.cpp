@@ -70,6 +70,18 @@ TEST(GeometricConsistency, TheFarthestTranslationIsKept) {
   EXPECT_NE(evidence.reason.find("translation 2.0 m above 1.0 m"), std::string::npos) << evidence.reason;
 }
 
+TEST(GeometricConsistency, NeighboursInTimeCount) {
+  ScanGeometry match = scan_at(31, SyntheticWorld::at(0, 0, 0)), query = scan_at(31, SyntheticWorld::at(2, 0, 0));
+  CandidateView view;
+  const double alone = check_geometric(match, query, view, {}).log_odds;
+  view.prior_log_odds = 2.0;
+  EXPECT_DOUBLE_EQ(check_geometric(match, query, view, {}).log_odds, alone + 2.0);
+  view.prior_log_odds = -50.0;
+  const GeometricEvidence refused = check_geometric(match, query, view, {});
+  EXPECT_FALSE(refused.consistent);
+  EXPECT_NE(refused.reason.find("probability 0.000 below 0.950"), std::string::npos) << refused.reason;
+}
+
 TEST(GeometricConsistency, NothingToRegister) {
   ScanGeometry match = scan_at(31, SyntheticWorld::at(0, 0, 0)), nothing{ThinCloud{}};
   EXPECT_FALSE(check_geometric(match, nothing, {planar_pose(0, 0, 0.0)}, {}).consistent);

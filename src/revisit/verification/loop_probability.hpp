@@ -11,9 +11,9 @@ struct LoopEvidence {
   double free_space_agreement = 0.0;  ///< smaller of both directions
   /// Correlation of intensities, as a share of that between consecutive scans; none where intensities say nothing.
   std::optional<double> intensity_agreement;
-  double rmse_m = 0.0;                ///< point-to-plane, over the inliers
-  double overlap = 0.0;               ///< of both scans seen from overhead
-  double distance_m = 0.0;            ///< between both sensors: farther apart, less fits even at the same place
+  double rmse_m = 0.0;      ///< point-to-plane, over the inliers
+  double overlap = 0.0;     ///< of both scans seen from overhead
+  double distance_m = 0.0;  ///< between both sensors: farther apart, less fits even at the same place
 };
 
 /// The log odds that the pose is right (within 0.5 m and 3 degrees), were right and wrong ones equally many: a logistic
