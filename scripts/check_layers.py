@@ -34,6 +34,7 @@ DOORS = {
     "xxhash": {"src/revisit/retrieval"},
     "faiss/": {"benchmarks"},
     "nanoflann": {"benchmarks"},
+    "ceres/": {"src/revisit/pose_graph"},
     "tsl/": {"src/revisit/odometry"},
     "toml++": {"src/revisit/config"},
     "nlohmann/": {"src/revisit/io", "src/revisit/config", "apps"},

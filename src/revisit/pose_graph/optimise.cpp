@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+
+#include <ceres/ceres.h>
+#include <ceres/rotation.h>
+#include <Eigen/Cholesky>
+
+#include <revisit/pose_graph/pose_graph.hpp>
+
+namespace revisit {
+namespace {
+
+// Of a right edge the squared error stays below this in 999 of 1000 cases (chi-square, 6 degrees of freedom).
+constexpr double kTruncation = 22.46;
+constexpr double kSharpen = 2.0;
+constexpr int kMostRounds = 60, kIterationsARound = 5, kIterationsAtLast = 20;
+
+// A node as Ceres moves it.
+struct Block {
+  Eigen::Vector3d t;
+  Eigen::Quaterniond q;
+};
+
+// The error of an edge, whitened by the square root of its information and weight.
+class EdgeError {
+ public:
+  EdgeError(const PoseEdge& edge, double weight) : t_(edge.T_from_to.translation()), q_(edge.T_from_to.rotation()) {
+    // Directions that an edge says nothing about have no information at all: LDLT bears that.
+    const Eigen::LDLT<Matrix6> ldlt(edge.information);
+    const Vector6 root = ldlt.vectorD().cwiseMax(0.0).cwiseSqrt();
+    const Matrix6 upper = ldlt.matrixU();
+    root_ = std::sqrt(weight) * (root.asDiagonal() * upper * ldlt.transpositionsP());
+  }
+
+  template <typename T>
+  bool operator()(const T* t_from, const T* q_from, const T* t_to, const T* q_to, T* residual) const {
+    using Vector = Eigen::Matrix<T, 3, 1>;
+    const Eigen::Map<const Vector> ta(t_from), tb(t_to);
+    const Eigen::Map<const Eigen::Quaternion<T>> qa(q_from), qb(q_to);
+    const Eigen::Quaternion<T> inverse = qa.conjugate();
+    const Eigen::Quaternion<T> turn = q_.conjugate().cast<T>() * (inverse * qb);
+    Eigen::Map<Eigen::Matrix<T, 6, 1>> r(residual);
+    r.template head<3>() = q_.conjugate().cast<T>() * (inverse * (tb - ta) - t_.cast<T>());
+    // The rotation vector, by the quaternion's short way round.
+    const T q[4] = {turn.w(), turn.x(), turn.y(), turn.z()};
+    ceres::QuaternionToAngleAxis(q, residual + 3);
+    r = (root_.cast<T>() * r).eval();
+    return true;
+  }
+
+ private:
+  Eigen::Vector3d t_;
+  Eigen::Quaterniond q_;
+  Matrix6 root_;
+};
+
+struct Solved {
+  bool is_usable = false;
+  double cost_before = 0.0, cost_after = 0.0;
+  int iterations = 0;
+  std::string message;
+};
+
+Solved solve(std::vector<Block>& blocks, const std::vector<PoseEdge>& edges, int most_iterations) {
+  ceres::Problem problem;
+  auto* const manifold = new ceres::EigenQuaternionManifold;  // NOLINT(cppcoreguidelines-owning-memory): the problem's
+  for (Block& block : blocks) {
+    problem.AddParameterBlock(block.t.data(), 3);
+    problem.AddParameterBlock(block.q.coeffs().data(), 4, manifold);
+  }
+  problem.SetParameterBlockConstant(blocks[0].t.data());
+  problem.SetParameterBlockConstant(blocks[0].q.coeffs().data());
+  for (const PoseEdge& edge : edges) {
+    if (edge.weight <= 0.0) continue;
+    // NOLINTNEXTLINE(cppcoreguidelines-owning-memory): the problem's
+    auto* const cost = new ceres::AutoDiffCostFunction<EdgeError, 6, 3, 4, 3, 4>(new EdgeError(edge, edge.weight));
+    problem.AddResidualBlock(cost, nullptr, blocks[edge.from].t.data(), blocks[edge.from].q.coeffs().data(),
+                             blocks[edge.to].t.data(), blocks[edge.to].q.coeffs().data());
+  }
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  options.logging_type = ceres::SILENT;
+  options.max_num_iterations = most_iterations;
+  options.function_tolerance = 1e-5;
+  options.num_threads = 2;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  return {summary.IsSolutionUsable(), summary.initial_cost, summary.final_cost,
+          static_cast<int>(summary.iterations.size()), summary.message};
+}
+
+}  // namespace
+
+bool PoseGraph::reweigh(const std::function<double(const PoseEdge&)>& squared, double mu) {
+  const double low = mu / (mu + 1.0) * kTruncation, high = (mu + 1.0) / mu * kTruncation;
+  bool is_decided = true;
+  for (PoseEdge& edge : edges_) {
+    if (!edge.is_loop) continue;
+    const double r2 = squared(edge);
+    edge.weight = r2 <= low ? 1.0 : r2 >= high ? 0.0 : std::sqrt(kTruncation / r2 * mu * (mu + 1.0)) - mu;
+    is_decided = is_decided && (r2 <= low || r2 >= high);
+  }
+  return is_decided;
+}
+
+Result<PoseGraph::Report> PoseGraph::optimise() {
+  Report report;
+  if (nodes_.size() < 2) return report;
+  std::vector<Block> blocks(nodes_.size());
+  const auto start_over = [&] {
+    std::transform(nodes_.begin(), nodes_.end(), blocks.begin(), [](const Pose& T) {
+      return Block{T.translation(), Eigen::Quaterniond(T.rotation()).normalized()};
+    });
+  };
+  start_over();
+  const auto pose = [&](std::size_t i) {
+    Pose T = Pose::Identity();
+    T.linear() = blocks[i].q.normalized().toRotationMatrix();
+    T.translation() = blocks[i].t;
+    return T;
+  };
+  const auto squared = [&](const PoseEdge& edge) { return squared_error(edge, pose(edge.from), pose(edge.to)); };
+
+  const auto solve_all = [&](int most_iterations) -> Status {
+    const Solved solved = solve(blocks, edges_, most_iterations);
+    if (!solved.is_usable) return Error{"pose graph of " + std::to_string(nodes_.size()) + " nodes: " + solved.message};
+    if (report.iterations == 0) report.cost_before = solved.cost_before;
+    report.iterations += solved.iterations;
+    report.cost_after = solved.cost_after;
+    return ok();
+  };
+  // Loops that were refused stay so while the others agree.
+  for (PoseEdge& edge : edges_) edge.weight = edge.is_loop && edge.weight < 0.5 ? 0.0 : 1.0;
+  if (const Status status = solve_all(kIterationsAtLast); !status) return status.error();
+
+  double worst = 0.0;
+  for (const PoseEdge& edge : edges_)
+    if (edge.is_loop && edge.weight > 0.0) worst = std::max(worst, squared(edge));
+  if (worst > kTruncation) {
+    // Some contradict: all are heard again, from the poses that these did not bend, and those that cannot be satisfied
+    // fade.
+    start_over();
+    worst = 0.0;
+    for (const PoseEdge& edge : edges_)
+      if (edge.is_loop) worst = std::max(worst, squared(edge));
+    double mu = kTruncation / std::max(kTruncation, 2.0 * worst - kTruncation);
+    for (int round = 0; round < kMostRounds && !reweigh(squared, mu); ++round, mu *= kSharpen)
+      if (const Status status = solve_all(kIterationsARound); !status) return status.error();
+    for (PoseEdge& edge : edges_) edge.weight = edge.weight < 0.5 ? 0.0 : 1.0;
+    if (const Status status = solve_all(kIterationsAtLast); !status) return status.error();
+  }
+  for (std::size_t i = 0; i < nodes_.size(); ++i) nodes_[i] = pose(i);
+  report.loops_refused = static_cast<std::size_t>(
+      std::count_if(edges_.begin(), edges_.end(), [](const PoseEdge& edge) { return edge.weight < 0.5; }));
+  return report;
+}
+
+}  // namespace revisit
