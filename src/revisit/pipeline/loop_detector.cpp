@@ -12,7 +12,8 @@
 namespace revisit {
 namespace {
 
-constexpr int kOverheadReach_m = 6;  // a translation that retrieval may be off
+constexpr int kOverheadReach_m = 6;    // a translation that retrieval may be off
+constexpr double kMostInFavour = 3.0;  // log odds that other answers may add to a candidate's
 
 }  // namespace
 
@@ -158,16 +159,17 @@ void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
   std::shared_ptr<const ScanGeometry> query = prepared.geometry;
   if (!query && std::any_of(opinions.begin(), opinions.end(), [](const Opinion& o) { return o.reason.empty(); }))
     query = std::make_shared<ScanGeometry>(prepared.cloud);
-  const auto register_one = [&](Opinion& each) {
+  const auto register_one = [&](Opinion& each, double prior_log_odds) {
     ScanGeometry match(places_.at(each.candidate.match).cloud);
     CandidateView view{each.T_guess_match_query, each.overlap};
-    view.prior_log_odds = what_neighbours_say(detection.frame, each.candidate.match);
+    view.prior_log_odds = prior_log_odds;
     if (const auto usual = ego_motion_.usual_intensity_correlation()) view.usual_intensity_correlation = *usual;
     each.geometric = check_geometric(match, *query, view, parameters_.geometric);
     each.reason = each.geometric->reason;
   };
   tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-    if (opinions[i].reason.empty()) register_one(opinions[i]);
+    if (opinions[i].reason.empty())
+      register_one(opinions[i], what_neighbours_say(detection.frame, opinions[i].candidate.match));
   });
 
   for (const Opinion& each : opinions)
@@ -182,7 +184,8 @@ void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
   if (answer.reason.empty() && parameters_.geometric.overhead_search)
     if (auto nearer = nearer_place(overhead, answer, detection)) {
       check_temporal_and_scores(detection.frame, *nearer);
-      if (nearer->reason.empty()) register_one(*nearer);
+      // That the scan was found next to it speaks for it as much as neighbours can.
+      if (nearer->reason.empty()) register_one(*nearer, kMostInFavour);
       if (nearer->reason.empty() && nearer->distance_m() < answer.distance_m()) answer = *std::move(nearer);
     }
   detection.geometric_ms += watch.lap_ms();
@@ -207,7 +210,7 @@ void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
 double LoopDetector::what_neighbours_say(FrameId query, FrameId match) const {
   // Scans that follow each other see much the same: each counts for a part of what it says, and all for a limited sum.
   constexpr std::int64_t kRecent_frames = 10;
-  constexpr double kShare = 0.3, kMostAgainst = 1.0, kMostInFavour = 3.0;
+  constexpr double kShare = 0.3, kMostAgainst = 1.0;
   double sum = 0.0;
   for (const RecentAnswer& answer : recent_answers_) {
     const std::int64_t since = query.value - answer.query.value;

@@ -70,7 +70,8 @@ Result<PoseGraph> PoseGraph::read_g2o(const std::filesystem::path& file) {
     Pose T = Pose::Identity();
     if (kind == "VERTEX_SE3:QUAT") {
       if (!(row >> a) || !read(row, T)) return refuse("is no vertex: id x y z qx qy qz qw with a unit quaternion");
-      if (!node_of.emplace(a, graph.nodes_.size()).second) return refuse("vertex " + std::to_string(a) + " comes twice");
+      if (!node_of.emplace(a, graph.nodes_.size()).second)
+        return refuse("vertex " + std::to_string(a) + " comes twice");
       graph.add_node(T);
     } else if (kind == "EDGE_SE3:QUAT") {
       PoseEdge edge;
