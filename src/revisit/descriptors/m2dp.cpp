@@ -17,6 +17,7 @@ namespace revisit::descriptors_internal {
 namespace {
 
 constexpr int kCircles = 8, kSectors = 16, kAzimuths = 4, kElevations = 16;
+constexpr Eigen::Index kPlanes = Eigen::Index{kAzimuths} * kElevations, kBins = Eigen::Index{kCircles} * kSectors;
 constexpr std::size_t kMostPoints = 16384;
 
 // The scan in the frame of its first two principal axes (section III-A), one point a column.
@@ -43,10 +44,10 @@ class M2dp final : public Baseline {
   std::string source() const override { return "He, Wang and Zhang, IROS 2016"; }
 
   Signature describe(std::span<const Point> points, double) const override {
-    if (points.empty()) return Signature::Zero(kAzimuths * kElevations + kCircles * kSectors, 1);
+    if (points.empty()) return Signature::Zero(kPlanes + kBins, 1);
     const Eigen::Matrix3Xf cloud = in_principal_axes(points);
     const float farthest = std::max(1e-3f, cloud.colwise().norm().maxCoeff());
-    Eigen::MatrixXf counts = Eigen::MatrixXf::Zero(kAzimuths * kElevations, kCircles * kSectors);
+    Eigen::MatrixXf counts = Eigen::MatrixXf::Zero(kPlanes, kBins);
     for (int a = 0; a < kAzimuths; ++a)
       for (int e = 0; e < kElevations; ++e) {
         const auto azimuth = static_cast<float>(kPi * a / kAzimuths);
@@ -69,7 +70,7 @@ class M2dp final : public Baseline {
       }
     counts /= static_cast<float>(cloud.cols());
     const Eigen::BDCSVD<Eigen::MatrixXf> svd(counts, Eigen::ComputeThinU | Eigen::ComputeThinV);
-    Signature result(kAzimuths * kElevations + kCircles * kSectors, 1);
+    Signature result(kPlanes + kBins, 1);
     result << svd.matrixU().col(0), svd.matrixV().col(0);
     // Counts are not negative, so neither are the first singular vectors but for a common sign.
     return result.sum() < 0.f ? Signature(-result) : result;

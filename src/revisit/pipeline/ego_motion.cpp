@@ -2,6 +2,7 @@
 #include <revisit/pipeline/ego_motion.hpp>
 
 #include <algorithm>
+#include <cmath>
 
 #include <revisit/registration/icp.hpp>
 
@@ -37,7 +38,7 @@ void EgoMotion::learn(double stamp_s, std::shared_ptr<const ScanGeometry> scan) 
 }
 
 void EgoMotion::learn_intensities(double correlation) {
-  const auto bin = static_cast<std::size_t>(std::clamp(correlation, 0.0, 1.0) * kLastBin + 0.5);
+  const auto bin = static_cast<std::size_t>(std::lround(std::clamp(correlation, 0.0, 1.0) * kLastBin));
   ++correlations_[bin];
   ++pairs_;
 }

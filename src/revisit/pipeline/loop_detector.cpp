@@ -75,7 +75,8 @@ Result<Detection> LoopDetector::localise(Scan scan) {
 Result<PreparedScan> LoopDetector::prepare_next(Scan scan) {
   // Without times nothing can be undone.
   const bool is_swept = !scan.times_s.empty();
-  auto prepared = prepare(std::move(scan), is_swept ? ego_motion_.expected(scan.stamp_s) : std::nullopt);
+  const std::optional<Twist> motion = is_swept ? ego_motion_.expected(scan.stamp_s) : std::nullopt;
+  auto prepared = prepare(std::move(scan), motion);
   if (prepared && (is_swept || !ego_motion_.knows_intensities())) {
     prepared->geometry = std::make_shared<ScanGeometry>(prepared->cloud);
     ego_motion_.learn(prepared->scan.stamp_s, prepared->geometry);
