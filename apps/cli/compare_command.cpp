@@ -96,8 +96,10 @@ Status answer(Method& method, Scan scan, PlaceIndex& frames, const std::optional
   return row ? method.writer->add(*row) : ok();
 }
 
-Status run_all(std::vector<Method>& methods, const Recording& recording, const Parameters& parameters,
-               const IntensityScale& scale) {
+// The number of scans that could not be read.
+Result<std::size_t> run_all(std::vector<Method>& methods, const Recording& recording, const Parameters& parameters,
+                            const IntensityScale& scale) {
+  std::size_t skipped = 0;
   Progress progress("compare", "scans", recording.size());
   ReadAhead scans(recording);
   PlaceIndex frames(parameters.retrieval);  // says which places are old enough, for those methods that do not
@@ -109,16 +111,17 @@ Status run_all(std::vector<Method>& methods, const Recording& recording, const P
     if (!scan) {
       progress.clear();
       print_log()(LogLevel::kWarning, scan.error().message + "; skipped");
+      ++skipped;
       continue;
     }
     std::optional<PreparedScan> prepared;
     if (has_baselines)
       if (auto made = prepare_scan(*scan, parameters, scale)) prepared = *std::move(made);
     for (Method& method : methods)
-      if (const Status status = answer(method, *scan, frames, prepared); !status) return status;
+      if (const Status status = answer(method, *scan, frames, prepared); !status) return status.error();
     if (prepared) frames.add(prepared->scan.frame, prepared->scan.stamp_s, prepared->descriptor);
   }
-  return ok();
+  return skipped;
 }
 
 Status evaluate_all(std::vector<Method>& methods, const Recording& recording, const Parameters& parameters,
@@ -158,7 +161,8 @@ int compare(const Options& options) {
   if (!methods) return fail(methods.error());
 
   listen_for_interrupt();
-  if (const Status status = run_all(*methods, **recording, *parameters, *scale); !status) return fail(status.error());
+  const auto skipped = run_all(*methods, **recording, *parameters, *scale);
+  if (!skipped) return fail(skipped.error());
   if (interrupted()) print_log()(LogLevel::kWarning, "interrupted: frames that were not reached count as missed");
   if (const Status status = evaluate_all(*methods, **recording, *parameters, options); !status)
     return fail(status.error());
@@ -172,7 +176,8 @@ int compare(const Options& options) {
         draw_comparison(out / "precision_recall.png", reports)})
     if (!status) return fail(status.error());
   std::cout << "Picture: " << (out / "precision_recall.png").string() << '\n';
-  return interrupted() ? kInterrupted : kDone;
+  if (interrupted()) return kInterrupted;
+  return *skipped == 0 ? kDone : kDoneWithReservations;
 }
 
 }  // namespace

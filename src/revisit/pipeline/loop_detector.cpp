@@ -215,7 +215,7 @@ double LoopDetector::what_neighbours_say(FrameId query, FrameId match) const {
   double sum = 0.0;
   for (const RecentAnswer& answer : recent_answers_) {
     const std::int64_t since = query.value - answer.query.value;
-    if (since <= kRecent_frames &&
+    if (since > 0 && since <= kRecent_frames &&
         std::abs(match.value - answer.match.value) <= parameters_.retrieval.separation_frames + 2 * since)
       sum += kShare * answer.log_odds;
   }

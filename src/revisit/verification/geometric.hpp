@@ -26,8 +26,8 @@ struct GeometricEvidence {
 
 /// What is known of a candidate before it is registered.
 struct CandidateView {
-  Pose T_guess_match_query =
-      Pose::Identity();  ///< the yaw that the descriptors agreed on, or the overhead search's pose
+  /// The yaw that the descriptors agreed on, or the overhead search's pose.
+  Pose T_guess_match_query = Pose::Identity();
   double overlap = 0.8;  ///< of both scans seen from overhead; as usual, where nobody looked
   /// The correlation of intensities that consecutive scans show with this sensor.
   double usual_intensity_correlation = 0.95;
@@ -35,9 +35,8 @@ struct CandidateView {
 };
 
 /// Geometric consistency (paper, section III-D): registers the query onto the match by ICP, from the guess; with
-/// features_fallback, from FPFH's
-/// transform where that is not consistent; with features_first, the other way round. Judges the better of both.
-/// Deterministic; one thread a scan.
+/// features_fallback, from FPFH's transform where that is not consistent; with features_first, the other way round.
+/// Judges the better of both. Deterministic; one thread a scan.
 GeometricEvidence check_geometric(const ScanGeometry& match, const ScanGeometry& query, const CandidateView& view,
                                   const GeometricOptions& options);
 
