@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <revisit/core/pose.hpp>
+#include <revisit/core/result.hpp>
+#include <revisit/core/results.hpp>
+
+namespace revisit {
+
+using Bytes = std::vector<std::byte>;
+
+/// A node of the pose graph, and what was seen from it. The store does not know what its bytes mean.
+struct StoredKeyframe {
+  FrameId frame;
+  double stamp_s = 0.0;
+  Pose T_odom_lidar = Pose::Identity();
+  bool starts_anew = false;  ///< tracking was lost before: how it lies to the key frames before is not known
+  /// Empty where the place was known already.
+  Bytes descriptor, place, cloud;
+};
+
+/// Where a scan was, from the key frame before it.
+struct StoredScan {
+  FrameId frame, keyframe;
+  double stamp_s = 0.0;
+  Pose T_keyframe_lidar = Pose::Identity();
+  Pose T_odom_lidar = Pose::Identity();
+  bool is_tracked = true;
+};
+
+/// What was measured between two key frames.
+struct StoredEdge {
+  FrameId from, to;
+  Pose T_from_to = Pose::Identity();
+  Matrix6 information = Matrix6::Identity();  ///< as in LoopConstraint
+  std::optional<LoopRow> loop;                ///< where it is one: `to` is the query
+};
+
+/// A map on disk (SQLite), which grows while it is made. What was committed survives whatever happens to the program.
+/// Belongs to one thread at a time.
+class MapStore {
+ public:
+  /// An existing file is an error.
+  static Result<MapStore> create(const std::filesystem::path& file);
+  /// Refused are files that are no map, or of another version.
+  static Result<MapStore> open(const std::filesystem::path& file);
+  MapStore(MapStore&&) noexcept;
+  MapStore& operator=(MapStore&&) noexcept;
+  ~MapStore();
+
+  Status add(const StoredKeyframe& keyframe);
+  Status add(const StoredScan& scan);
+  Status add(const StoredEdge& edge);
+  Status add(const CandidateRow& answer);
+  /// Everything added since the last commit becomes part of the map, or none of it does.
+  Status commit();
+
+  /// A note to remember: which recording, which parameters. A second one of the same name replaces the first.
+  Status set_note(const std::string& name, const std::string& text);
+  Result<std::optional<std::string>> note(const std::string& name) const;
+
+  /// In the order of their frames, the bytes left out.
+  Result<std::vector<StoredKeyframe>> keyframes() const;
+  Result<std::vector<StoredScan>> scans() const;
+  /// In the order in which they were added.
+  Result<std::vector<StoredEdge>> edges() const;
+  Result<std::vector<CandidateRow>> answers() const;
+  enum class Part { kDescriptor, kPlace, kCloud };
+  /// Empty where the place was known already. An unknown frame is an error.
+  Result<Bytes> part(FrameId keyframe, Part part) const;
+
+ private:
+  struct Database;
+  explicit MapStore(std::unique_ptr<Database> database);
+  std::unique_ptr<Database> database_;
+};
+
+}  // namespace revisit
