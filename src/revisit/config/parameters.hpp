@@ -69,6 +69,14 @@ struct GeometricOptions {
   double max_translation_m = 15.0;    ///< a longer relative translation is refused
 };
 
+/// Trajectory and map (docs/slam.md).
+struct SlamOptions {
+  double keyframe_distance_m = 1.5;  ///< a key frame at the latest after so far
+  double keyframe_angle_deg = 20.0;  ///< and after turning so much
+  double keyframe_overlap = 0.5;     ///< and where less of the scan is in view of the last one
+  double map_voxel_m = 0.2;          ///< edge of the voxels of the map
+};
+
 /// A drive that is simulated instead of read (docs/simulation.md).
 struct SimulationOptions {
   std::string world = "town";     ///< town or warehouse
@@ -90,6 +98,7 @@ struct Parameters {
   RetrievalOptions retrieval;
   TemporalOptions temporal;
   GeometricOptions geometric;
+  SlamOptions slam;
   SimulationOptions simulation;
 };
 

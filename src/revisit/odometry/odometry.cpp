@@ -60,6 +60,8 @@ OdometryStep Odometry::find(double stamp_s, std::span<const Point> points,
   OdometryStep step;
   step.T_odom_lidar = T_odom_lidar_;
   if (!map_) {
+    if (T_before_now) step.T_before_now = *T_before_now;
+    step.T_odom_lidar = T_odom_lidar_ * step.T_before_now;
     step.is_tracked = true;  // wherever it is: there the map begins
     return step;
   }
@@ -121,6 +123,22 @@ void Odometry::accept(double stamp_s, std::span<const Point> points, const Odome
   map_->forget_far_from(T_odom_lidar_.translation().cast<float>());
   last_stamp_s_ = stamp_s;
   ++scans_;
+}
+
+void Odometry::restart() {
+  map_.reset();
+  motion_.reset();
+  squared_surprise_m2_ = usual_match_ = 0.0;
+  scans_ = 0;
+}
+
+void Odometry::stand_at(double stamp_s, const Pose& T_odom_lidar, const std::optional<Twist>& motion) {
+  last_stamp_s_ = stamp_s;
+  T_odom_lidar_ = T_odom_lidar;
+  motion_ = motion;
+  // How usual scans match is to be learnt again.
+  squared_surprise_m2_ = usual_match_ = 0.0;
+  scans_ = 1;
 }
 
 OdometryStep Odometry::track(double stamp_s, std::span<const Point> points, const std::optional<Pose>& T_before_now) {

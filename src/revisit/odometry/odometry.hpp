@@ -37,6 +37,11 @@ class Odometry {
   /// Both.
   OdometryStep track(double stamp_s, std::span<const Point> points, const std::optional<Pose>& T_before_now = {});
 
+  /// Forgets what was seen: the next scan begins a map of its own where it is expected to be. For a track that is lost.
+  void restart();
+  /// Goes on from here, with the motion since the scan before, if any. For a map that was put together from elsewhere.
+  void stand_at(double stamp_s, const Pose& T_odom_lidar, const std::optional<Twist>& motion);
+
   const LocalMap* map() const { return map_ ? &*map_ : nullptr; }
 
  private:

@@ -28,21 +28,22 @@ CandidateRow Detection::row() const {
 }
 
 LoopDetector::LoopDetector(const Parameters& parameters, std::optional<IntensityScale> scale,
-                           IntensityCalibration calibration, LogSink log)
+                           IntensityCalibration calibration, LogSink log, std::unique_ptr<PlaceClouds> clouds)
     : parameters_(parameters),
       scale_(std::move(scale)),
       calibration_(std::move(calibration)),
       log_(std::move(log)),
-      index_(parameters.retrieval) {
+      index_(parameters.retrieval),
+      clouds_(clouds ? std::move(clouds) : clouds_in_memory()) {
   if (const Status status = validate(parameters); !status) throw std::invalid_argument(status.error().message);
 }
 
 Result<Detection> LoopDetector::process(Scan scan, const std::optional<Pose>& T_world_lidar) {
   auto prepared = prepare_next(std::move(scan));
   if (!prepared) return prepared.error();
-  auto detection = detect(*prepared, T_world_lidar, Past::kOldEnough);
+  auto detection = detect(*prepared, T_world_lidar, Past{});
   if (!detection) return detection.error();
-  remember(*std::move(prepared), T_world_lidar);
+  if (const Status status = remember(*std::move(prepared), T_world_lidar); !status) return status.error();
   return detection;
 }
 
@@ -62,14 +63,13 @@ double LoopDetector::Opinion::score() const {
 Status LoopDetector::add(Scan scan, const std::optional<Pose>& T_world_lidar) {
   auto prepared = prepare_next(std::move(scan));
   if (!prepared) return prepared.error();
-  remember(*std::move(prepared), T_world_lidar);
-  return ok();
+  return remember(*std::move(prepared), T_world_lidar);
 }
 
 Result<Detection> LoopDetector::localise(Scan scan) {
   const auto prepared = prepare(std::move(scan));
   if (!prepared) return prepared.error();
-  return detect(*prepared, std::nullopt, Past::kAll);
+  return detect(*prepared, std::nullopt, Past{.is_all = true});
 }
 
 Result<PreparedScan> LoopDetector::prepare_next(Scan scan) {
@@ -77,11 +77,13 @@ Result<PreparedScan> LoopDetector::prepare_next(Scan scan) {
   const bool is_swept = !scan.times_s.empty();
   const std::optional<Twist> motion = is_swept ? ego_motion_.expected(scan.stamp_s) : std::nullopt;
   auto prepared = prepare(std::move(scan), motion);
-  if (prepared && (is_swept || !ego_motion_.knows_intensities())) {
-    prepared->geometry = std::make_shared<ScanGeometry>(prepared->cloud);
-    ego_motion_.learn(prepared->scan.stamp_s, prepared->geometry);
-  }
+  if (prepared && (is_swept || !ego_motion_.knows_intensities())) learn_intensities(*prepared);
   return prepared;
+}
+
+void LoopDetector::learn_intensities(PreparedScan& prepared) {
+  prepared.geometry = std::make_shared<ScanGeometry>(prepared.cloud);
+  ego_motion_.learn(prepared.scan.stamp_s, prepared.geometry);
 }
 
 Result<PreparedScan> LoopDetector::prepare(Scan scan, const std::optional<Twist>& motion) {
@@ -106,7 +108,7 @@ Result<PreparedScan> LoopDetector::prepare(Scan scan, const std::optional<Twist>
 }
 
 Result<Detection> LoopDetector::detect(const PreparedScan& prepared, const std::optional<Pose>& T_world_lidar,
-                                       Past past) {
+                                       const Past& past) {
   Detection detection;
   detection.frame = prepared.scan.frame;
   detection.points = prepared.scan.points.size();
@@ -116,23 +118,29 @@ Result<Detection> LoopDetector::detect(const PreparedScan& prepared, const std::
   detection.preparation_ms = prepared.ms;
 
   Stopwatch watch;
-  const double stamp_s = prepared.scan.stamp_s;
-  if (past == Past::kOldEnough)
-    detection.newest_searchable = index_.newest_searchable(detection.frame, stamp_s);
-  else if (!places_.empty())
-    detection.newest_searchable = places_.rbegin()->first;
-  auto candidates = past == Past::kAll ? index_.search_all(prepared.descriptor)
-                                       : index_.search(detection.frame, stamp_s, prepared.descriptor);
+  // As if asked when those that may answer are just old enough.
+  FrameId asked = detection.frame;
+  double asked_s = prepared.scan.stamp_s;
+  if (past.newest_frame_stamp_s) {
+    asked.value = past.newest_frame_stamp_s->first.value + parameters_.retrieval.exclude_frames;
+    asked_s = past.newest_frame_stamp_s->second + parameters_.retrieval.exclude_s;
+  }
+  if (!past.is_all)
+    detection.newest_searchable = index_.newest_searchable(asked, asked_s);
+  else if (!T_world_places_.empty())
+    detection.newest_searchable = T_world_places_.rbegin()->first;
+  auto candidates = past.is_all ? index_.search_all(prepared.descriptor)
+                                : index_.search(asked, asked_s, prepared.descriptor);
   if (!candidates) return candidates.error();
   detection.candidates = *std::move(candidates);
   detection.search_ms = watch.lap_ms();
   if (detection.candidates.empty())
     detection.reason = detection.newest_searchable ? "no place like it" : "no searchable past";
-  else
-    verify(detection, prepared);
+  else if (const Status status = verify(detection, prepared); !status)
+    return status.error();
 
   if (detection.answer && T_world_lidar)
-    if (const auto& T_world_match = places_.at(detection.answer->match).T_world_lidar)
+    if (const auto& T_world_match = T_world_places_.at(detection.answer->match))
       detection.T_match_query_by_odometry = T_world_match->inverse() * *T_world_lidar;
 
   recent_queries_.emplace_back(detection.frame, prepared.descriptor);
@@ -140,13 +148,17 @@ Result<Detection> LoopDetector::detect(const PreparedScan& prepared, const std::
   return detection;
 }
 
-void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
+Status LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
   std::vector<Opinion> opinions;
-  for (const LoopCandidate& candidate : detection.candidates) opinions.emplace_back(candidate);
+  for (const LoopCandidate& candidate : detection.candidates) {
+    auto place = clouds_->get(candidate.match);
+    if (!place) return place.error();
+    opinions.emplace_back(candidate).place = *std::move(place);
+  }
   Stopwatch watch;
   OverheadSearch overhead(prepared.cloud);
   if (parameters_.geometric.overhead_search) {
-    for (Opinion& each : opinions) look_from_overhead(overhead, each);
+    for (Opinion& each : opinions) look_from_overhead(overhead, *each.place, each);
     std::stable_sort(opinions.begin(), opinions.end(),
                      [](const Opinion& a, const Opinion& b) { return a.overlap > b.overlap; });
   }
@@ -161,7 +173,7 @@ void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
   if (!query && std::any_of(opinions.begin(), opinions.end(), [](const Opinion& o) { return o.reason.empty(); }))
     query = std::make_shared<ScanGeometry>(prepared.cloud);
   const auto register_one = [&](Opinion& each, double prior_log_odds) {
-    ScanGeometry match(places_.at(each.candidate.match).cloud);
+    const ScanGeometry match(*each.place);
     CandidateView view{each.T_guess_match_query, each.overlap};
     view.prior_log_odds = prior_log_odds;
     if (const auto usual = ego_motion_.usual_intensity_correlation()) view.usual_intensity_correlation = *usual;
@@ -180,15 +192,18 @@ void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
   const Opinion* best = nullptr;
   for (const Opinion& each : opinions)
     if (best == nullptr || each.score() > best->score()) best = &each;
-  if (best == nullptr) return;
+  if (best == nullptr) return ok();
   Opinion answer = *best;
-  if (answer.reason.empty() && parameters_.geometric.overhead_search)
-    if (auto nearer = nearer_place(overhead, answer, detection)) {
+  if (answer.reason.empty() && parameters_.geometric.overhead_search) {
+    auto found = nearer_place(overhead, answer, detection);
+    if (!found) return found.error();
+    if (std::optional<Opinion>& nearer = *found) {
       check_temporal_and_scores(detection.frame, *nearer);
       // That the scan was found next to it speaks for it as much as neighbours can.
       if (nearer->reason.empty()) register_one(*nearer, kMostInFavour);
       if (nearer->reason.empty() && nearer->distance_m() < answer.distance_m()) answer = *std::move(nearer);
     }
+  }
   detection.geometric_ms += watch.lap_ms();
 
   detection.answer = answer.candidate;
@@ -206,6 +221,7 @@ void LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
         LoopConstraint{detection.frame,       answer.candidate.match, found.T_match_query, found.evidence.inlier_ratio,
                        found.evidence.rmse_m, found.probability,      found.information};
   }
+  return ok();
 }
 
 double LoopDetector::what_neighbours_say(FrameId query, FrameId match) const {
@@ -222,11 +238,10 @@ double LoopDetector::what_neighbours_say(FrameId query, FrameId match) const {
   return std::clamp(sum, -kMostAgainst, kMostInFavour);
 }
 
-void LoopDetector::look_from_overhead(OverheadSearch& overhead, Opinion& opinion) const {
+void LoopDetector::look_from_overhead(OverheadSearch& overhead, const ThinCloud& place, Opinion& opinion) const {
   // Half a sector of the descriptor and a little more.
   const double yaw_reach_rad = kPi / parameters_.descriptor.sectors + to_radians(3.0);
-  const OverheadMatch found = overhead.search(places_.at(opinion.candidate.match).cloud, opinion.candidate.yaw_rad,
-                                              yaw_reach_rad, kOverheadReach_m);
+  const OverheadMatch found = overhead.search(place, opinion.candidate.yaw_rad, yaw_reach_rad, kOverheadReach_m);
   opinion.T_guess_match_query = planar_pose(found.x_m, found.y_m, found.yaw_rad);
   opinion.overlap = found.overlap;
   if (found.overlap < parameters_.geometric.min_overlap) {
@@ -258,22 +273,24 @@ void LoopDetector::check_temporal_and_scores(FrameId frame, Opinion& opinion) co
   }
 }
 
-std::optional<LoopDetector::Opinion> LoopDetector::nearer_place(OverheadSearch& overhead, const Opinion& answer,
-                                                                const Detection& detection) const {
+Result<std::optional<LoopDetector::Opinion>> LoopDetector::nearer_place(OverheadSearch& overhead,
+                                                                        const Opinion& answer,
+                                                                        const Detection& detection) const {
   constexpr double kNear_m = 1.5;
   const Pose& T = answer.geometric->T_match_query;
-  if (answer.distance_m() < kNear_m) return std::nullopt;
+  std::optional<Opinion> nearest;
+  if (answer.distance_m() < kNear_m) return nearest;
   const double yaw_rad = yaw_of(T);
   const std::int64_t around = 2 * std::int64_t{parameters_.retrieval.separation_frames};
-  std::optional<Opinion> nearest;
   double least_m = answer.distance_m();
   for (std::int64_t frame = answer.candidate.match.value - around; frame <= answer.candidate.match.value + around;
        ++frame) {
-    const auto place = places_.find(FrameId{frame});
-    if (place == places_.end() || *detection.newest_searchable < FrameId{frame} ||
+    if (!T_world_places_.contains(FrameId{frame}) || *detection.newest_searchable < FrameId{frame} ||
         frame == answer.candidate.match.value)
       continue;
-    const OverheadMatch found = overhead.search(place->second.cloud, yaw_rad, to_radians(3.0), kOverheadReach_m);
+    auto place = clouds_->get(FrameId{frame});
+    if (!place) return place.error();
+    const OverheadMatch found = overhead.search(**place, yaw_rad, to_radians(3.0), kOverheadReach_m);
     const double distance_m = std::hypot(found.x_m, found.y_m);
     if (found.overlap < parameters_.geometric.min_overlap || distance_m >= least_m) continue;
     least_m = distance_m;
@@ -281,13 +298,22 @@ std::optional<LoopDetector::Opinion> LoopDetector::nearer_place(OverheadSearch& 
     nearest->candidate.match = FrameId{frame};
     nearest->T_guess_match_query = planar_pose(found.x_m, found.y_m, found.yaw_rad);
     nearest->overlap = found.overlap;
+    nearest->place = *std::move(place);
   }
   return nearest;
 }
 
-void LoopDetector::remember(PreparedScan prepared, const std::optional<Pose>& T_world_lidar) {
-  index_.add(prepared.scan.frame, prepared.scan.stamp_s, prepared.descriptor);
-  places_[prepared.scan.frame] = {std::move(prepared.cloud), T_world_lidar};
+Status LoopDetector::remember(PreparedScan prepared, const std::optional<Pose>& T_world_lidar) {
+  const FrameId frame = prepared.scan.frame;
+  if (const Status status = clouds_->put(frame, std::move(prepared.cloud)); !status) return status;
+  index_.add(frame, prepared.scan.stamp_s, prepared.descriptor);
+  T_world_places_[frame] = T_world_lidar;
+  return ok();
+}
+
+void LoopDetector::recall(FrameId frame, double stamp_s, const IntensityScanContext& descriptor) {
+  index_.add(frame, stamp_s, descriptor);
+  T_world_places_[frame] = std::nullopt;
 }
 
 }  // namespace revisit

@@ -9,6 +9,7 @@
 
 #include <revisit/core/results.hpp>
 #include <revisit/pipeline/ego_motion.hpp>
+#include <revisit/pipeline/place_clouds.hpp>
 #include <revisit/pipeline/prepare.hpp>
 #include <revisit/registration/overhead_search.hpp>
 #include <revisit/retrieval/place_index.hpp>
@@ -48,8 +49,10 @@ struct Detection {
 class LoopDetector {
  public:
   /// Without a `scale`, the first scan decides it. Throws std::invalid_argument for parameters out of range.
+  /// `clouds` keeps what places are registered by; without, memory does.
   explicit LoopDetector(const Parameters& parameters, std::optional<IntensityScale> scale = std::nullopt,
-                        IntensityCalibration calibration = {}, LogSink log = {});
+                        IntensityCalibration calibration = {}, LogSink log = {},
+                        std::unique_ptr<PlaceClouds> clouds = nullptr);
 
   /// Looks for the scan's place among those old enough (exclusion of the recent past), then adds it.
   /// `T_world_lidar`, if there is one, is odometry: recorded as evidence, never used to decide.
@@ -62,19 +65,27 @@ class LoopDetector {
   /// Looks for the scan's place among all that were added, and adds nothing: where am I in this map?
   Result<Detection> localise(Scan scan);
 
+  /// The same in steps, for a caller that knows the sensor's motion and chooses its places: each scan made ready, the
+  /// first ones learnt from, some looked for, some remembered.
+  Result<PreparedScan> prepare(Scan scan, const std::optional<Twist>& motion = std::nullopt);
+  /// Learns how well intensities agree usually, from a scan that follows the one before.
+  void learn_intensities(PreparedScan& prepared);
+  bool knows_intensities() const { return ego_motion_.knows_intensities(); }
+  /// Which places may answer: those old enough, all, or those up to a frame and time (of a lost robot: before it was).
+  struct Past {
+    bool is_all = false;
+    std::optional<std::pair<FrameId, double>> newest_frame_stamp_s = std::nullopt;
+  };
+  Result<Detection> detect(const PreparedScan& prepared, const std::optional<Pose>& T_world_lidar, const Past& past);
+  Status remember(PreparedScan prepared, const std::optional<Pose>& T_world_lidar);
+  /// A place that `clouds` holds already, of an earlier run.
+  void recall(FrameId frame, double stamp_s, const IntensityScanContext& descriptor);
+
   const PlaceIndex& index() const { return index_; }
 
  private:
-  struct Place {
-    ThinCloud cloud;
-    std::optional<Pose> T_world_lidar;
-  };
-  enum class Past { kOldEnough, kAll };
-
-  Result<PreparedScan> prepare(Scan scan, const std::optional<Twist>& motion = std::nullopt);
   // The next scan of the recording: its distortion is undone, and the motion learnt from it.
   Result<PreparedScan> prepare_next(Scan scan);
-  Result<Detection> detect(const PreparedScan& prepared, const std::optional<Pose>& T_world_lidar, Past past);
   // What is found out about a candidate, step by step; `reason` says why it is no loop.
   struct Opinion {
     explicit Opinion(const LoopCandidate& of) : candidate(of), T_guess_match_query(planar_pose(0, 0, of.yaw_rad)) {}
@@ -82,6 +93,7 @@ class LoopDetector {
     double distance_m() const { return geometric->T_match_query.translation().norm(); }
 
     LoopCandidate candidate;
+    std::shared_ptr<const ThinCloud> place;
     Pose T_guess_match_query;
     double overlap = 0.0;  ///< seen from overhead
     TemporalEvidence temporal;
@@ -89,15 +101,14 @@ class LoopDetector {
     std::string reason;
   };
 
-  void verify(Detection& detection, const PreparedScan& prepared);
+  Status verify(Detection& detection, const PreparedScan& prepared);
   // Log odds in favour of the match that the scans shortly before give, which were found next to it or were not.
   double what_neighbours_say(FrameId query, FrameId match) const;
-  void look_from_overhead(OverheadSearch& overhead, Opinion& opinion) const;
+  void look_from_overhead(OverheadSearch& overhead, const ThinCloud& place, Opinion& opinion) const;
   void check_temporal_and_scores(FrameId frame, Opinion& opinion) const;
   // The place among the answer's neighbours that the query stands nearest to, if it is another.
-  std::optional<Opinion> nearer_place(OverheadSearch& overhead, const Opinion& answer,
-                                      const Detection& detection) const;
-  void remember(PreparedScan prepared, const std::optional<Pose>& T_world_lidar);
+  Result<std::optional<Opinion>> nearer_place(OverheadSearch& overhead, const Opinion& answer,
+                                              const Detection& detection) const;
 
   Parameters parameters_;
   std::optional<IntensityScale> scale_;
@@ -105,7 +116,8 @@ class LoopDetector {
   LogSink log_;
   bool rings_were_reported_ = false;
   PlaceIndex index_;
-  std::map<FrameId, Place> places_;
+  std::map<FrameId, std::optional<Pose>> T_world_places_;  ///< odometry, where there was some
+  std::unique_ptr<PlaceClouds> clouds_;
   EgoMotion ego_motion_;
   struct RecentAnswer {
     FrameId query, match;

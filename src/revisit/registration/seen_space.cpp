@@ -45,4 +45,19 @@ SeenSpace::Verdict SeenSpace::look(const Eigen::Vector3f& p, float margin_m) con
   return Verdict::kSurface;
 }
 
+std::vector<std::uint16_t> SeenSpace::ranges_cm() const {
+  std::vector<std::uint16_t> ranges;
+  ranges.reserve(2 * cells_.size());
+  for (const Interval& cell : cells_) ranges.insert(ranges.end(), {cell.nearest_cm, cell.farthest_cm});
+  return ranges;
+}
+
+std::optional<SeenSpace> SeenSpace::from_ranges_cm(std::span<const std::uint16_t> ranges) {
+  SeenSpace seen;
+  if (ranges.empty()) return seen;
+  if (ranges.size() != std::size_t{2} * kAzimuths * kElevations) return std::nullopt;
+  for (std::size_t i = 0; i < ranges.size(); i += 2) seen.cells_.push_back({ranges[i], ranges[i + 1]});
+  return seen;
+}
+
 }  // namespace revisit

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -27,6 +28,11 @@ class SeenSpace {
 
   /// `p` in the scan's frame; `margin_m` is what the ranges may be off.
   Verdict look(const Eigen::Vector3f& p, float margin_m) const;
+
+  /// Nearest and farthest range of each cell in turn, cm, to be kept; empty where nothing was seen.
+  std::vector<std::uint16_t> ranges_cm() const;
+  /// Nothing where they are not those of all cells.
+  static std::optional<SeenSpace> from_ranges_cm(std::span<const std::uint16_t> ranges);
 
  private:
   struct Interval {

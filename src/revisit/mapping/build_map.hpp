@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <revisit/core/pose.hpp>
+#include <revisit/core/result.hpp>
+#include <revisit/core/scan.hpp>
+
+namespace revisit {
+
+struct MapOptions {
+  double voxel_m = 0.2;      ///< edge of the voxels: one point each
+  double tile_m = 50.0;      ///< edge of a tile on the ground plane
+  bool thin_moving = true;   ///< leave out what stood there for a moment only
+};
+
+/// One tile of the map: a file that a viewer can load by itself.
+struct MapTile {
+  std::string file;  ///< its name in the folder `tiles`
+  int x = 0, y = 0;  ///< covers [x, x + 1) * tile_m by [y, y + 1) * tile_m
+  std::size_t points = 0;
+  double min_z_m = 0.0, max_z_m = 0.0;
+};
+
+struct MapReport {
+  std::vector<MapTile> tiles;
+  std::size_t points = 0, moving = 0;  ///< of the map; left out, before thinning
+};
+
+/// Puts key frames together into `folder`: map.ply, map.pcd, and tiles/ with a .ply a tile and tiles.json.
+/// `T_world_keyframes` in the order of the recording; `points(i)` gives the points of key frame i in its own frame, or
+/// none. In memory are some key frames and one tile at a time. `progress(done)` counts key frames and stops the work
+/// by returning false: then nothing is written.
+Result<MapReport> build_map(const std::vector<Pose>& T_world_keyframes,
+                            const std::function<Result<std::vector<Point>>(std::size_t)>& points,
+                            const MapOptions& options, const std::filesystem::path& folder,
+                            const std::function<bool(std::size_t)>& progress = {});
+
+}  // namespace revisit

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <compare>
+#include <filesystem>
+#include <map>
+#include <vector>
+
+#include <revisit/core/result.hpp>
+#include <revisit/core/scan.hpp>
+
+namespace revisit::mapping_internal {
+
+struct TileIndex {
+  int x = 0, y = 0;
+  auto operator<=>(const TileIndex&) const = default;
+};
+
+/// Points sorted into square tiles of the ground plane on the disk, in the order in which they came: a map larger than
+/// memory.
+class TileFiles {
+ public:
+  /// Files of unfinished tiles stand in `folder`, which exists.
+  TileFiles(std::filesystem::path folder, double tile_m) : folder_(std::move(folder)), tile_m_(tile_m) {}
+
+  Status add(const std::vector<Point>& points);
+  Status flush();
+  std::vector<TileIndex> tiles() const;
+  /// All points of a tile; its file is gone afterwards.
+  Result<std::vector<Point>> take(const TileIndex& tile);
+
+ private:
+  std::filesystem::path file(const TileIndex& tile) const;
+  Status append(const TileIndex& tile, std::vector<Point>& points);
+
+  std::filesystem::path folder_;
+  double tile_m_;
+  std::map<TileIndex, std::vector<Point>> waiting_;
+};
+
+/// One point a voxel, the mean of its points, in the order of the voxels.
+std::vector<Point> one_point_a_voxel(const std::vector<Point>& points, double voxel_m);
+
+}  // namespace revisit::mapping_internal

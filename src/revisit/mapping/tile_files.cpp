@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/mapping/internal/tile_files.hpp>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <string>
+#include <utility>
+
+#include <Eigen/Core>
+
+namespace revisit::mapping_internal {
+
+std::filesystem::path TileFiles::file(const TileIndex& tile) const {
+  return folder_ / ("unfinished_" + std::to_string(tile.x) + "_" + std::to_string(tile.y));
+}
+
+Status TileFiles::append(const TileIndex& tile, std::vector<Point>& points) {
+  if (points.empty()) return ok();
+  std::ofstream stream(file(tile), std::ios::binary | std::ios::app);
+  stream.write(reinterpret_cast<const char*>(points.data()),
+               static_cast<std::streamsize>(points.size() * sizeof(Point)));
+  stream.close();
+  if (!stream) return Error{file(tile).string() + ": cannot be written: " + std::strerror(errno)};
+  points.clear();
+  return ok();
+}
+
+Status TileFiles::add(const std::vector<Point>& points) {
+  constexpr std::size_t kMostWaiting = 50'000;
+  for (const Point& p : points) {
+    const TileIndex tile{static_cast<int>(std::floor(p.x / tile_m_)), static_cast<int>(std::floor(p.y / tile_m_))};
+    auto& waiting = waiting_[tile];
+    waiting.push_back(p);
+    if (waiting.size() >= kMostWaiting)
+      if (const Status status = append(tile, waiting); !status) return status;
+  }
+  return ok();
+}
+
+Status TileFiles::flush() {
+  for (auto& [tile, points] : waiting_)
+    if (const Status status = append(tile, points); !status) return status;
+  return ok();
+}
+
+std::vector<TileIndex> TileFiles::tiles() const {
+  std::vector<TileIndex> all;
+  for (const auto& [tile, points] : waiting_) all.push_back(tile);
+  return all;
+}
+
+Result<std::vector<Point>> TileFiles::take(const TileIndex& tile) {
+  std::error_code failure;
+  const auto bytes = std::filesystem::file_size(file(tile), failure);
+  std::vector<Point> points(failure ? 0 : bytes / sizeof(Point));
+  std::ifstream stream(file(tile), std::ios::binary);
+  stream.read(reinterpret_cast<char*>(points.data()), static_cast<std::streamsize>(points.size() * sizeof(Point)));
+  if (!stream) return Error{file(tile).string() + ": cannot be read back"};
+  std::filesystem::remove(file(tile), failure);
+  return points;
+}
+
+std::vector<Point> one_point_a_voxel(const std::vector<Point>& points, double voxel_m) {
+  // 21 bits an axis: a million voxels either way.
+  constexpr std::int64_t kOffset = 1 << 20, kMask = (1 << 21) - 1;
+  const auto voxel_of = [&](const Point& p) {
+    std::uint64_t voxel = 0;
+    for (const float value : {p.z, p.y, p.x}) {
+      const auto index = static_cast<std::int64_t>(std::floor(static_cast<double>(value) / voxel_m)) + kOffset;
+      voxel = voxel << 21 | static_cast<std::uint64_t>(index & kMask);
+    }
+    return voxel;
+  };
+  std::vector<std::pair<std::uint64_t, std::size_t>> by_voxel(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) by_voxel[i] = {voxel_of(points[i]), i};
+  std::sort(by_voxel.begin(), by_voxel.end());
+  std::vector<Point> thinned;
+  for (std::size_t begin = 0, end = 0; begin < by_voxel.size(); begin = end) {
+    Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+    for (; end < by_voxel.size() && by_voxel[end].first == by_voxel[begin].first; ++end) {
+      const Point& p = points[by_voxel[end].second];
+      sum += Eigen::Vector4d(p.x, p.y, p.z, p.intensity);
+    }
+    const Eigen::Vector4f mean = (sum / static_cast<double>(end - begin)).cast<float>();
+    thinned.push_back({mean[0], mean[1], mean[2], mean[3]});
+  }
+  return thinned;
+}
+
+}  // namespace revisit::mapping_internal

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <revisit/core/pose.hpp>
+
+namespace revisit {
+
+/// How far the graph trusts a measurement: information matrices as in LoopConstraint. Registration counts every point
+/// as a witness of its own and is off by more than it says; what it is off at least is added (docs/slam.md).
+
+/// Of the way between key frames, T_from_to; `registration` is the information of the last scan in it.
+Matrix6 odometry_information(const Pose& T_from_to, const Matrix6& registration);
+Matrix6 loop_information(const Matrix6& registration);
+/// Of a way that nobody measured.
+Matrix6 no_information();
+
+}  // namespace revisit

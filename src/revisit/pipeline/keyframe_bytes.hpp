@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <revisit/core/scan.hpp>
+#include <revisit/descriptors/intensity_scan_context.hpp>
+#include <revisit/registration/surface_cloud.hpp>
+#include <revisit/store/map_store.hpp>
+
+namespace revisit {
+
+/// What the store keeps of a key frame, as bytes (docs/formats.md). Reading gives nothing where the bytes are not what
+/// was written: cut off, or with numbers that cannot be.
+Bytes to_bytes(const IntensityScanContext& descriptor);
+std::optional<IntensityScanContext> to_descriptor(std::span<const std::byte> bytes);
+
+Bytes to_bytes(const ThinCloud& cloud);
+std::optional<ThinCloud> to_thin_cloud(std::span<const std::byte> bytes);
+
+/// A cloud for the map: positions to a centimetre (up to 327 m), intensity in 255 steps of [0, 1]; 7 bytes a point.
+Bytes to_map_bytes(const ThinCloud& cloud);
+std::optional<std::vector<Point>> to_map_points(std::span<const std::byte> bytes);
+
+}  // namespace revisit

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/pose_graph/loop_gate.hpp>
+
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+namespace revisit {
+namespace {
+
+// Out along x, a key frame a metre, and the same way again from frame 1000 on, as odometry sees it: 2 % too long.
+LoopGate gate_of_two_visits() {
+  LoopGate gate;
+  for (int i = 0; i < 100; ++i) gate.add_keyframe({i}, planar_pose(i, 0, 0), false);
+  for (int i = 0; i < 100; ++i) gate.add_keyframe({1000 + i}, planar_pose(1.01 * i, 5, 0), false);
+  return gate;
+}
+
+LoopRow loop(int query, int match, double x_m, double probability = 0.97) {
+  return {{{query}, {match}, planar_pose(x_m, 0, 0), 0.8, 0.1, probability, Matrix6::Identity()}, 1.0};
+}
+
+TEST(LoopGate, ALoopWaitsUntilAnotherAgrees) {
+  LoopGate gate = gate_of_two_visits();
+  EXPECT_TRUE(gate.offer(loop(1010, 10, 0.2)).empty());
+  const auto decisions = gate.offer(loop(1012, 12, 0.1));
+  ASSERT_EQ(decisions.size(), 2u);
+  EXPECT_EQ(decisions[0].loop.constraint.query, FrameId{1010});
+  EXPECT_TRUE(decisions[0].enters && decisions[1].enters);
+  EXPECT_TRUE(gate.decide_waiting(true).empty());
+}
+
+TEST(LoopGate, LoopsThatContradictDoNotLetEachOtherIn) {
+  LoopGate gate = gate_of_two_visits();
+  EXPECT_TRUE(gate.offer(loop(1010, 10, 0.2)).empty());
+  EXPECT_TRUE(gate.offer(loop(1012, 30, 0.1)).empty()) << "18 m off";
+  for (const auto& decision : gate.decide_waiting(true)) EXPECT_FALSE(decision.enters);
+}
+
+TEST(LoopGate, AloneOnlyTheSureEnter) {
+  LoopGate gate = gate_of_two_visits();
+  EXPECT_TRUE(gate.offer(loop(1010, 10, 0.2, 0.9995)).empty());
+  EXPECT_TRUE(gate.offer(loop(1090, 90, 0.2, 0.98)).empty()) << "too far for odometry to compare them";
+  const auto passed = gate.decide_waiting(false);
+  ASSERT_EQ(passed.size(), 1u) << "the newest key frame is only 9 m beyond the second one";
+  EXPECT_TRUE(passed[0].enters);
+  const auto rest = gate.decide_waiting(true);
+  ASSERT_EQ(rest.size(), 1u);
+  EXPECT_FALSE(rest[0].enters);
+}
+
+TEST(LoopGate, SureOfItselfButAgainstTheOthers) {
+  LoopGate gate = gate_of_two_visits();
+  EXPECT_TRUE(gate.offer(loop(1010, 10, 0.2)).empty());
+  EXPECT_EQ(gate.offer(loop(1012, 12, 0.1)).size(), 2u);
+  EXPECT_TRUE(gate.offer(loop(1014, 30, 0.1, 0.9999)).empty());
+  const auto rest = gate.decide_waiting(true);
+  ASSERT_EQ(rest.size(), 1u);
+  EXPECT_FALSE(rest[0].enters);
+}
+
+TEST(LoopGate, NothingIsComparedAcrossALossOfTrack) {
+  LoopGate gate;
+  for (int i = 0; i < 20; ++i) gate.add_keyframe({i}, planar_pose(i, 0, 0), false);
+  for (int i = 0; i < 20; ++i) gate.add_keyframe({1000 + i}, planar_pose(i, 5, 0), i == 11);
+  EXPECT_TRUE(gate.offer(loop(1010, 10, 0.2)).empty());
+  EXPECT_TRUE(gate.offer(loop(1012, 12, 0.1)).empty());
+  EXPECT_EQ(gate.offer(loop(1014, 14, 0.1)).size(), 2u);
+}
+
+TEST(LoopGate, KnowsItsKeyframes) {
+  LoopGate gate = gate_of_two_visits();
+  EXPECT_TRUE(gate.offer(loop(1010, 10, 0.2)).empty());
+  EXPECT_THROW(gate.offer(loop(5000, 10, 0.2)), std::invalid_argument);
+  EXPECT_THROW(gate.add_keyframe({3}, Pose::Identity(), false), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace revisit
