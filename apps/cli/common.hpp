@@ -27,9 +27,13 @@ enum ExitCode : int {
   kInterrupted = 130,
 };
 
+/// The map of `revisit slam`, in its folder.
+inline constexpr const char* kMapStore = "map.sqlite";
+
 /// A sub-command registers its flags and, if chosen, is run through the returned function.
 using Run = std::function<int()>;
 Run add_detect(CLI::App& program);
+Run add_slam(CLI::App& program);
 Run add_evaluate(CLI::App& program);
 Run add_compare(CLI::App& program);
 Run add_describe(CLI::App& program);

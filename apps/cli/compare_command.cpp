@@ -143,7 +143,8 @@ Status evaluate_all(std::vector<Method>& methods, const Recording& recording, co
                                 rules,
                                 evaluate_retrieval(*candidates, reference),
                                 evaluate_retrieval(*candidates, reference, RevisitKind::kReverse),
-                                evaluate_loops(*loops, reference)};
+                                evaluate_loops(*loops, reference),
+                                {}};
   }
   return ok();
 }

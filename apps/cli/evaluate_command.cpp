@@ -5,11 +5,13 @@
 
 #include <revisit/io/pose_file.hpp>
 #include <revisit/io/result_files.hpp>
+#include <revisit/store/map_store.hpp>
 
 #include "common.hpp"
 #include "evaluation_pictures.hpp"
 #include "report.hpp"
 #include "run_file.hpp"
+#include "trajectory_pictures.hpp"
 
 namespace revisit::cli {
 namespace {
@@ -80,6 +82,43 @@ Result<Trajectory> load_reference(const Options& options, const Recording* recor
   return present;
 }
 
+// `revisit slam` asks and answers with key frames: only these count in tables 1 and 2.
+Result<Trajectory> frames_asked(const fs::path& folder, const Trajectory& reference) {
+  std::error_code failure;
+  if (!fs::exists(folder / kMapStore, failure)) return reference;
+  const auto store = MapStore::open(folder / kMapStore);
+  if (!store) return store.error();
+  const auto keyframes = store->keyframes();
+  if (!keyframes) return keyframes.error();
+  Trajectory asked;
+  for (const StoredKeyframe& keyframe : *keyframes)
+    if (const auto found = reference.entries.find(keyframe.frame); found != reference.entries.end())
+      asked.entries.insert(*found);
+  return asked;
+}
+
+// A trajectory that `revisit slam` wrote, on the frames of the reference.
+Result<JudgedTrajectory> judge(const fs::path& file, const Trajectory& reference) {
+  const auto poses = read_poses(file);
+  if (!poses) return poses.error();
+  Stamps stamps;
+  for (const auto& [frame, entry] : reference.entries) stamps.emplace_back(frame, entry.stamp_s);
+  JudgedTrajectory judged;
+  judged.trajectory = to_trajectory(*poses, std::nullopt, stamps);
+  judged.table = evaluate_trajectory(judged.trajectory, reference);
+  return judged;
+}
+
+Status judge_trajectories(const fs::path& folder, const Trajectory& reference, EvaluationReport& report) {
+  std::error_code failure;
+  if (!fs::exists(folder / "odometry.tum", failure)) return ok();
+  const auto before = judge(folder / "odometry.tum", reference), after = judge(folder / "poses.tum", reference);
+  for (const auto* each : {&before, &after})
+    if (!*each) return each->error();
+  report.trajectories = {before->table, after->table};
+  return draw_trajectories(folder / "trajectories.png", reference, *before, *after, folder / "tiles");
+}
+
 int evaluate(const Options& options) {
   const fs::path folder = options.results;
   const auto candidates = read_candidates(folder / "candidates.csv");
@@ -125,11 +164,14 @@ int evaluate(const Options& options) {
                 kUsage);
   const auto trajectory = load_reference(options, recording.get());
   if (!trajectory) return fail(trajectory.error());
-  const Reference reference(*trajectory, report.rules);
+  const auto asked = frames_asked(folder, *trajectory);
+  if (!asked) return fail(asked.error());
+  const Reference reference(*asked, report.rules);
   report.retrieval = evaluate_retrieval(*candidates, reference);
   report.reverse_retrieval = evaluate_retrieval(*candidates, reference, RevisitKind::kReverse);
   report.loops = evaluate_loops(*loops, reference);
 
+  if (const Status status = judge_trajectories(folder, *trajectory, report); !status) return fail(status.error());
   if (report.loops.without_reference > 0)
     print_log()(LogLevel::kWarning, std::to_string(report.loops.without_reference) +
                                         " accepted loops have no reference pose and are not judged");
@@ -149,8 +191,10 @@ Run add_evaluate(CLI::App& program) {
   auto options = std::make_shared<Options>();
   CLI::App* command = program.add_subcommand("evaluate", "Score results against reference poses, and draw them.");
   command->footer(
-      "Prints table 1 (retrieval) and table 2 (loop constraints), and writes into DIR: report.html,\n"
-      "precision_recall.png, trajectory.png, evaluation.json. Works on the files of any program that writes\n"
+      "Prints table 1 (retrieval), table 2 (loop constraints) and, of `revisit slam`, table 3 (trajectory), and "
+      "writes\n"
+      "into DIR: report.html, precision_recall.png, trajectory.png, trajectories.png, evaluation.json. Works on the "
+      "files of any program that writes\n"
       "candidates.csv and loops.csv (docs/formats.md).\n\n"
       "Example: revisit evaluate results/00 --reference kitti/poses/00.txt --camera-calibration "
       "kitti/sequences/00/calib.txt");

@@ -12,6 +12,7 @@ int main(int argc, char** argv) {
       "A first run:\n"
       "  revisit info RECORDING                     what is in there\n"
       "  revisit detect RECORDING --out results     find the loops\n"
+      "  revisit slam RECORDING --out map           trajectory and map\n"
       "  revisit evaluate results --reference POSES score them, draw them\n\n"
       "RECORDING is a KITTI odometry folder, a KITTI raw drive, a folder of .bin, .pcd or .ply scans, or the .toml of "
       "a\n"
@@ -25,8 +26,8 @@ int main(int argc, char** argv) {
 
   program_arguments().assign(argv + 1, argv + argc);
   std::vector<std::pair<CLI::App*, Run>> commands;
-  for (const auto add :
-       {add_info, add_describe, add_detect, add_evaluate, add_compare, add_calibrate, add_simulate, add_parameters}) {
+  for (const auto add : {add_info, add_describe, add_detect, add_slam, add_evaluate, add_compare, add_calibrate,
+                         add_simulate, add_parameters}) {
     Run run = add(program);
     commands.emplace_back(program.get_subcommands({}).back(), std::move(run));
   }

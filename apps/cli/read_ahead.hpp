@@ -7,12 +7,14 @@
 
 namespace revisit::cli {
 
-/// Reads a recording from its first scan on, the next one while the caller works on this one.
+/// Reads a recording from its scan `first` on, the next one while the caller works on this one.
 class ReadAhead {
  public:
-  explicit ReadAhead(const Recording& recording) : recording_(recording) { start(); }
+  explicit ReadAhead(const Recording& recording, std::size_t first = 0) : recording_(recording), index_(first) {
+    start();
+  }
 
-  /// The next scan; to be called at most recording.size() times.
+  /// The next scan; to be called at most recording.size() - first times.
   Result<Scan> next() {
     Result<Scan> scan = pending_.get();
     start();
@@ -26,7 +28,7 @@ class ReadAhead {
   }
 
   const Recording& recording_;
-  std::size_t index_ = 0;
+  std::size_t index_;
   std::future<Result<Scan>> pending_;  // waits for its thread when it goes
 };
 

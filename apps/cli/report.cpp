@@ -37,6 +37,18 @@ Table table_2(const EvaluationReport& report) {
        error(t.p95_translation_m, "m"), error(t.median_rotation_deg, "deg"), error(t.p95_rotation_deg, "deg")}};
 }
 
+Table table_3(const EvaluationReport::Trajectories& trajectories) {
+  Table table = {{"", "frames", "length", "ATE", "at most", "relative", "relative"}};
+  const auto add = [&](const char* name, const TrajectoryTable& t) {
+    table.push_back({name, std::to_string(t.frames), format("%.0f m", t.length_m), format("%.3f m", t.ate_m),
+                     format("%.3f m", t.worst_m), t.relative_percent ? format("%.3f %%", *t.relative_percent) : "-",
+                     t.relative_deg_per_m ? format("%.5f deg/m", *t.relative_deg_per_m) : "-"});
+  };
+  add("odometry", trajectories.odometry);
+  add("loops closed", trajectories.corrected);
+  return table;
+}
+
 std::string rules_text(const EvaluationReport& report) {
   const EvaluationRules& rules = report.rules;
   std::string text = format(
@@ -53,7 +65,9 @@ std::string rules_text(const EvaluationReport& report) {
 
 std::string to_text(const EvaluationReport& report) {
   return "Table 1, retrieval (top-1, score swept)\n" + to_text(table_1(report)) +
-         "\nTable 2, loop constraints (as accepted)\n" + to_text(table_2(report)) + "\n" + rules_text(report) + "\n";
+         "\nTable 2, loop constraints (as accepted)\n" + to_text(table_2(report)) +
+         (report.trajectories ? "\nTable 3, trajectory\n" + to_text(table_3(*report.trajectories)) : "") + "\n" +
+         rules_text(report) + "\n";
 }
 
 std::string to_json(const EvaluationReport& report) {
@@ -68,7 +82,7 @@ std::string to_json(const EvaluationReport& report) {
                                   {"extended_precision", t.extended_precision}};
   };
   const LoopTable& l = report.loops;
-  const nlohmann::ordered_json document = {
+  nlohmann::ordered_json document = {
       {"results", report.results},
       {"reference", report.reference},
       {"rules",
@@ -89,6 +103,20 @@ std::string to_json(const EvaluationReport& report) {
         {"p95_translation_m", l.p95_translation_m},
         {"median_rotation_deg", l.median_rotation_deg},
         {"p95_rotation_deg", l.p95_rotation_deg}}}};
+  const auto optional = [](const std::optional<double>& value) {
+    return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json();
+  };
+  const auto trajectory = [&](const TrajectoryTable& t) {
+    return nlohmann::ordered_json{{"frames", t.frames},
+                                  {"length_m", t.length_m},
+                                  {"ate_m", t.ate_m},
+                                  {"worst_m", t.worst_m},
+                                  {"relative_percent", optional(t.relative_percent)},
+                                  {"relative_deg_per_m", optional(t.relative_deg_per_m)}};
+  };
+  if (report.trajectories)
+    document["table_3"] = {{"odometry", trajectory(report.trajectories->odometry)},
+                           {"corrected", trajectory(report.trajectories->corrected)}};
   return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
@@ -103,6 +131,12 @@ std::string to_html(const EvaluationReport& report) {
          "curve. "
          "R@P100: recall before the first false answer. EP: mean of the first precision and R@P100.</p>\n" +
          "<h2>Table 2, loop constraints</h2>\n" + to_html(table_2(report)) +
+         (report.trajectories
+              ? "<h2>Table 3, trajectory</h2>\n" + to_html(table_3(*report.trajectories)) +
+                    "<p>ATE: root of the mean square of the distance to the reference, after alignment. Relative: "
+                    "KITTI's "
+                    "error over 100 to 800 m.</p>\n<img src=\"trajectories.png\" alt=\"both trajectories\">\n"
+              : "") +
          "<h2>Trajectory and loops</h2>\n<img src=\"trajectory.png\" alt=\"trajectory with loops\">\n"
          "<h2>Precision and recall</h2>\n<img src=\"precision_recall.png\" alt=\"precision over recall\">\n</html>\n";
 }

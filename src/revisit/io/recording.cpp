@@ -26,7 +26,7 @@ class FolderRecording final : public Recording {
   std::string kind_;
   std::vector<ScanFile> scans_;
   bool has_times_ = false;
-  Trajectory trajectory_;
+  Trajectory trajectory_, wheel_odometry_;
   std::optional<Pose> T_camera_lidar_;
   fs::path point_values_;  // where times and rings of points may stand
   LogSink log_;
@@ -37,6 +37,7 @@ class FolderRecording final : public Recording {
   std::string kind() const override { return kind_; }
   bool has_times() const override { return has_times_; }
   const Trajectory& trajectory() const override { return trajectory_; }
+  const Trajectory& wheel_odometry() const override { return wheel_odometry_; }
   std::optional<Pose> T_camera_lidar() const override { return T_camera_lidar_; }
 
   Result<Scan> read(std::size_t index) const override {
@@ -52,14 +53,14 @@ class FolderRecording final : public Recording {
   }
 
   // Poses of frames that the recording does not hold are left out.
-  void set_trajectory(const PoseFile& poses) {
+  Trajectory of_scans(const PoseFile& poses) const {
     std::vector<std::pair<FrameId, double>> stamps;
     for (const ScanFile& scan : scans_) stamps.emplace_back(scan.frame, scan.stamp_s);
     const Trajectory all = to_trajectory(poses, T_camera_lidar_, stamps);
-    trajectory_ = {};
+    Trajectory present;
     for (const ScanFile& scan : scans_)
-      if (const auto found = all.entries.find(scan.frame); found != all.entries.end())
-        trajectory_.entries.insert(*found);
+      if (const auto found = all.entries.find(scan.frame); found != all.entries.end()) present.entries.insert(*found);
+    return present;
   }
 };
 
@@ -148,7 +149,7 @@ Status add_kitti_odometry(FolderRecording& recording, const fs::path& folder) {
     if (!is_present(file)) continue;
     const auto poses = read_poses(file);
     if (!poses) return poses.error();
-    recording.set_trajectory(*poses);
+    recording.trajectory_ = recording.of_scans(*poses);
     break;
   }
   return ok();
@@ -205,10 +206,15 @@ Result<std::unique_ptr<Recording>> open_recording(const fs::path& folder, const 
                                          : ok();
       !added)
     return added.error();
+  if (const fs::path wheels = folder / "wheel_odometry.tum"; is_present(wheels)) {
+    const auto poses = read_poses(wheels);
+    if (!poses) return poses.error();
+    recording->wheel_odometry_ = recording->of_scans(*poses);
+  }
   if (!poses_file.empty()) {
     const auto poses = read_poses(poses_file);
     if (!poses) return poses.error();
-    recording->set_trajectory(*poses);
+    recording->trajectory_ = recording->of_scans(*poses);
     if (recording->trajectory_.empty())
       return Error{poses_file.string() + ": no pose belongs to a frame of " + folder.string()};
   }

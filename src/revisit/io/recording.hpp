@@ -29,14 +29,17 @@ class Recording {
   virtual bool has_times() const = 0;
   /// LiDAR poses that came with the recording, for the frames that have one; may be empty.
   virtual const Trajectory& trajectory() const = 0;
+  /// What the wheels said, in a frame of their own, for the frames that have it; may be empty.
+  virtual const Trajectory& wheel_odometry() const = 0;
   /// Calibration of a KITTI camera, for pose files in its frame.
   virtual std::optional<Pose> T_camera_lidar() const = 0;
 };
 
 /// Opens a KITTI odometry folder (velodyne/, times.txt, calib.txt, poses.txt, point times and rings if there are any),
-/// a KITTI raw drive (velodyne_points/data/, oxts/), or a bare folder of .bin, .pcd or .ply scans. Poses, times and
-/// calibration that are there but broken are errors; scans are only looked at when they are read. `poses_file` (KITTI,
-/// TUM or g2o) stands in for the poses that the folder has, if any.
+/// a KITTI raw drive (velodyne_points/data/, oxts/), or a bare folder of .bin, .pcd or .ply scans. The first two may
+/// have a wheel_odometry.tum (poses of the LiDAR). Poses, times and calibration that are there but broken are errors;
+/// scans are only looked at when they are read. `poses_file` (KITTI, TUM or g2o) stands in for the poses that the
+/// folder has, if any.
 Result<std::unique_ptr<Recording>> open_recording(const std::filesystem::path& folder, const LogSink& log = {},
                                                   const std::filesystem::path& poses_file = {});
 

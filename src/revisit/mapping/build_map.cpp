@@ -62,8 +62,7 @@ std::vector<Point> placed(const std::vector<Point>& points, const std::vector<st
   result.reserve(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!leave_out.empty() && leave_out[i] != 0) continue;
-    const Eigen::Vector3f p =
-        (T_world_lidar * Eigen::Vector3d(points[i].x, points[i].y, points[i].z)).cast<float>();
+    const Eigen::Vector3f p = (T_world_lidar * Eigen::Vector3d(points[i].x, points[i].y, points[i].z)).cast<float>();
     result.push_back({p.x(), p.y(), p.z(), points[i].intensity});
   }
   return result;

@@ -14,9 +14,9 @@
 namespace revisit {
 
 struct MapOptions {
-  double voxel_m = 0.2;      ///< edge of the voxels: one point each
-  double tile_m = 50.0;      ///< edge of a tile on the ground plane
-  bool thin_moving = true;   ///< leave out what stood there for a moment only
+  double voxel_m = 0.2;     ///< edge of the voxels: one point each
+  double tile_m = 50.0;     ///< edge of a tile on the ground plane
+  bool thin_moving = true;  ///< leave out what stood there for a moment only
 };
 
 /// One tile of the map: a file that a viewer can load by itself.

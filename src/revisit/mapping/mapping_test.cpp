@@ -54,7 +54,7 @@ TEST(BuildMap, KeepsWhatStaysAndLeavesOutWhatMoves) {
   const auto seen = [](std::size_t i) -> Result<std::vector<Point>> {
     const double x_m = static_cast<double>(i);
     auto points = wall_from(x_m);
-    add_box(points, 15.0, x_m);        // parked
+    add_box(points, 15.0, x_m);               // parked
     add_box(points, -20.0 + 3.0 * x_m, x_m);  // drives by
     return points;
   };
@@ -84,7 +84,8 @@ TEST(BuildMap, KeepsWhatStaysAndLeavesOutWhatMoves) {
 
 TEST(BuildMap, TilesHoldTheWholeMapOnce) {
   const fs::path folder = fresh_folder("tiles");
-  const auto report = build_map({planar_pose(100, 100, kPi / 2)}, [](std::size_t) { return wall_from(0.0); }, {}, folder);
+  const auto report = build_map(
+      {planar_pose(100, 100, kPi / 2)}, [](std::size_t) { return wall_from(0.0); }, {}, folder);
   ASSERT_TRUE(report);
   ASSERT_GE(report->tiles.size(), 2u);
   std::size_t points = 0;
@@ -102,16 +103,18 @@ TEST(BuildMap, TilesHoldTheWholeMapOnce) {
 }
 
 TEST(BuildMap, AnUnreadableKeyframeAndAFolderThatCannotBe) {
-  const auto broken = build_map({Pose::Identity()}, [](std::size_t) -> Result<std::vector<Point>> {
-    return Error{"key frame 0 is damaged"};
-  }, {}, fresh_folder("broken"));
+  const auto broken = build_map(
+      {Pose::Identity()}, [](std::size_t) -> Result<std::vector<Point>> { return Error{"key frame 0 is damaged"}; }, {},
+      fresh_folder("broken"));
   ASSERT_FALSE(broken);
   EXPECT_EQ(broken.error().message, "key frame 0 is damaged");
-  EXPECT_FALSE(build_map({Pose::Identity()}, [](std::size_t) { return wall_from(0.0); }, {}, "/dev/null"));
+  EXPECT_FALSE(build_map(
+      {Pose::Identity()}, [](std::size_t) { return wall_from(0.0); }, {}, "/dev/null"));
 }
 
 TEST(BuildMap, NothingComesOfNothing) {
-  const auto report = build_map({}, [](std::size_t) { return wall_from(0.0); }, {}, fresh_folder("empty"));
+  const auto report = build_map(
+      {}, [](std::size_t) { return wall_from(0.0); }, {}, fresh_folder("empty"));
   ASSERT_TRUE(report);
   EXPECT_EQ(report->points, 0u);
 }

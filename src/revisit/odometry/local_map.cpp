@@ -126,11 +126,24 @@ void LocalMap::forget_far_from(const Eigen::Vector3f& centre) {
 }
 
 bool LocalMap::nearest_patch(const Eigen::Vector3f& query, float squared_reach_m2, Patch& patch) const {
-  // Of each axis, the voxel of the query and its neighbour on the nearer side.
-  const Index low = (query / voxel_m_ - Eigen::Vector3f::Constant(0.5f)).array().floor().cast<int>();
+  // Of each axis, the voxel of the query and its neighbour on the nearer side, which is so far away.
+  const Eigen::Vector3f cells = query / voxel_m_;
+  const Eigen::Vector3f own = cells.array().floor(), within = cells - own;
+  const Index voxel = own.cast<int>();
+  Index side;
+  Eigen::Vector3f gap2;
+  for (int axis = 0; axis < 3; ++axis) {
+    const bool is_above = within[axis] >= 0.5f;
+    side[axis] = is_above ? 1 : -1;
+    const float gap_m = voxel_m_ * (is_above ? 1.f - within[axis] : within[axis]);
+    gap2[axis] = gap_m * gap_m;
+  }
   const Voxel* best = nullptr;
   for (int corner = 0; corner < 8; ++corner) {
-    const auto found = voxels_->map.find(low + Index(corner & 1, corner >> 1 & 1, corner >> 2));
+    const Index step(corner & 1, corner >> 1 & 1, corner >> 2);
+    // Nothing in that voxel is nearer than its border.
+    if (step.cast<float>().dot(gap2) >= squared_reach_m2) continue;
+    const auto found = voxels_->map.find(voxel + step.cwiseProduct(side));
     if (found == voxels_->map.end() || found->second.patch.normal.isZero()) continue;
     const float d2 = (found->second.patch.point - query).squaredNorm();
     if (d2 >= squared_reach_m2) continue;

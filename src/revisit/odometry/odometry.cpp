@@ -12,6 +12,7 @@ namespace revisit {
 namespace {
 
 constexpr double kPartsOfAVoxel = 2.0;  // along an edge: points that the map is given
+constexpr double kReach_m = 100.0;      // of the map
 constexpr double kForget = 0.1;         // share of the newest in a running mean
 constexpr double kFarSearch_m = 2.0;    // where little is known of the motion
 constexpr double kFewestMatched = 0.3, kUsualSpread = 0.2;
@@ -41,11 +42,17 @@ std::optional<Twist> Odometry::expected(double stamp_s) const {
   return gap_s > 0.0 && gap_s <= kLongestGap_s ? motion_ : std::nullopt;
 }
 
-void Odometry::start(double stamp_s, std::span<const Point> points) {
-  range_m_ = median_range_m(points);
-  constexpr double kVoxelsToTheMedian = 12.0, kSmallest_m = 0.25, kLargest_m = 1.0, kReach_m = 100.0;
-  map_.emplace(std::clamp(range_m_ / kVoxelsToTheMedian, kSmallest_m, kLargest_m), kReach_m);
-  last_stamp_s_ = stamp_s;
+OdometryScan Odometry::thinned(std::span<const Point> points) const {
+  OdometryScan scan;
+  scan.range_m = map_ ? range_m_ : median_range_m(points);
+  constexpr double kVoxelsToTheMedian = 12.0, kSmallest_m = 0.25, kLargest_m = 1.0;
+  scan.voxel_m = map_ ? map_->voxel_m() : std::clamp(scan.range_m / kVoxelsToTheMedian, kSmallest_m, kLargest_m);
+  scan.map_points = thin_surfaces(points, {}, scan.voxel_m / kPartsOfAVoxel).points;
+  std::vector<Point> thinned_once;
+  thinned_once.reserve(scan.map_points.size());
+  for (const Eigen::Vector3f& p : scan.map_points) thinned_once.push_back({p.x(), p.y(), p.z(), 0.f});
+  scan.points = thin_surfaces(thinned_once, {}, scan.voxel_m).points;
+  return scan;
 }
 
 double Odometry::search_radius_m() const {
@@ -55,8 +62,7 @@ double Odometry::search_radius_m() const {
   return std::clamp(kSigmas * std::sqrt(squared_surprise_m2_), kLeastVoxels * map_->voxel_m(), kFarSearch_m);
 }
 
-OdometryStep Odometry::find(double stamp_s, std::span<const Point> points,
-                            const std::optional<Pose>& T_before_now) const {
+OdometryStep Odometry::find(double stamp_s, const OdometryScan& scan, const std::optional<Pose>& T_before_now) const {
   OdometryStep step;
   step.T_odom_lidar = T_odom_lidar_;
   if (!map_) {
@@ -66,13 +72,12 @@ OdometryStep Odometry::find(double stamp_s, std::span<const Point> points,
     return step;
   }
   const double voxel_m = map_->voxel_m();
-  const ThinCloud cloud = thin(points, {}, voxel_m);
   const std::optional<Twist> twist = expected(stamp_s);
   const Pose T_moved = T_before_now ? *T_before_now
                        : twist      ? motion_after(*twist, stamp_s - last_stamp_s_)
                                     : Pose::Identity();
   const auto align = [&](double radius_m, const Pose& T_guess) {
-    IcpResult icp = align_icp(*map_, cloud.points, T_odom_lidar_ * T_guess,
+    IcpResult icp = align_icp(*map_, scan.points, T_odom_lidar_ * T_guess,
                               {.coarse_m = radius_m,
                                .fine_m = std::min(radius_m, 0.3 * voxel_m + 0.1),
                                .least_reach_m = voxel_m,
@@ -107,10 +112,11 @@ OdometryStep Odometry::find(double stamp_s, std::span<const Point> points,
   return step;
 }
 
-void Odometry::accept(double stamp_s, std::span<const Point> points, const OdometryStep& step) {
+void Odometry::accept(double stamp_s, const OdometryScan& scan, const OdometryStep& step) {
   const double gap_s = stamp_s - last_stamp_s_;
   if (!map_) {
-    start(stamp_s, points);
+    range_m_ = scan.range_m;
+    map_.emplace(scan.voxel_m, kReach_m);
   } else {
     const double share = std::max(kForget, 1.0 / scans_);
     if (step.is_tracked) squared_surprise_m2_ += share * (step.surprise_m * step.surprise_m - squared_surprise_m2_);
@@ -119,8 +125,13 @@ void Odometry::accept(double stamp_s, std::span<const Point> points, const Odome
     if (gap_s > 0.0 && gap_s <= kLongestGap_s) motion_ = twist_of(step.T_before_now, gap_s);
   }
   T_odom_lidar_ = step.T_odom_lidar;
-  if (step.is_tracked) map_->add(in_map(thin(points, {}, map_->voxel_m() / kPartsOfAVoxel).points, T_odom_lidar_));
-  map_->forget_far_from(T_odom_lidar_.translation().cast<float>());
+  if (step.is_tracked) map_->add(in_map(scan.map_points, T_odom_lidar_));
+  constexpr float kForgetEvery_m = 5.f;
+  if (const Eigen::Vector3f here = T_odom_lidar_.translation().cast<float>();
+      (here - forgotten_from_).norm() > kForgetEvery_m) {
+    map_->forget_far_from(here);
+    forgotten_from_ = here;
+  }
   last_stamp_s_ = stamp_s;
   ++scans_;
 }
@@ -142,8 +153,9 @@ void Odometry::stand_at(double stamp_s, const Pose& T_odom_lidar, const std::opt
 }
 
 OdometryStep Odometry::track(double stamp_s, std::span<const Point> points, const std::optional<Pose>& T_before_now) {
-  OdometryStep step = find(stamp_s, points, T_before_now);
-  accept(stamp_s, points, step);
+  const OdometryScan scan = thinned(points);
+  OdometryStep step = find(stamp_s, scan, T_before_now);
+  accept(stamp_s, scan, step);
   return step;
 }
 

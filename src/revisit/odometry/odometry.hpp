@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <span>
+#include <vector>
 
 #include <revisit/core/pose.hpp>
 #include <revisit/core/scan.hpp>
@@ -10,6 +11,13 @@
 #include <revisit/odometry/local_map.hpp>
 
 namespace revisit {
+
+/// A scan thinned for tracking, in its own frame.
+struct OdometryScan {
+  std::vector<Eigen::Vector3f> points;      ///< one a voxel of the map: what is found in it
+  std::vector<Eigen::Vector3f> map_points;  ///< some more: what enters it
+  double voxel_m = 1.0, range_m = 10.0;     ///< edge of a voxel; the median range
+};
 
 /// Where one scan was found to be.
 struct OdometryStep {
@@ -29,12 +37,14 @@ class Odometry {
   /// The motion during the coming scan, if it follows closely on the last: to undo its distortion with.
   std::optional<Twist> expected(double stamp_s) const;
 
-  /// Finds the scan (filtered by range, undistorted) in the map. `T_before_now`, if there is one, is what wheels or
-  /// another odometry measured since the scan before: the guess, and the answer where the map gives none.
-  OdometryStep find(double stamp_s, std::span<const Point> points, const std::optional<Pose>& T_before_now = {}) const;
+  /// Thins a scan (filtered by range, undistorted).
+  OdometryScan thinned(std::span<const Point> points) const;
+  /// Finds the scan in the map. `T_before_now`, if there is one, is what wheels or another odometry measured since the
+  /// scan before: the guess, and the answer where the map gives none.
+  OdometryStep find(double stamp_s, const OdometryScan& scan, const std::optional<Pose>& T_before_now = {}) const;
   /// Goes on from there: the scan enters the map.
-  void accept(double stamp_s, std::span<const Point> points, const OdometryStep& step);
-  /// Both.
+  void accept(double stamp_s, const OdometryScan& scan, const OdometryStep& step);
+  /// All three.
   OdometryStep track(double stamp_s, std::span<const Point> points, const std::optional<Pose>& T_before_now = {});
 
   /// Forgets what was seen: the next scan begins a map of its own where it is expected to be. For a track that is lost.
@@ -45,12 +55,12 @@ class Odometry {
   const LocalMap* map() const { return map_ ? &*map_ : nullptr; }
 
  private:
-  void start(double stamp_s, std::span<const Point> points);
   double search_radius_m() const;
 
   std::optional<LocalMap> map_;
   Pose T_odom_lidar_ = Pose::Identity();
   std::optional<Twist> motion_;
+  Eigen::Vector3f forgotten_from_ = Eigen::Vector3f::Zero();  ///< where the map was last cut to its reach
   double last_stamp_s_ = 0.0, range_m_ = 0.0;
   double squared_surprise_m2_ = 0.0;  ///< running mean of how far expectation was off
   double usual_match_ = 0.0;          ///< running mean of the share that met the map

@@ -39,7 +39,7 @@ TEST(Odometry, SaysWhenItIsLostAndKeepsWhatWheelsSay) {
   for (int i = 0; i < 12; ++i) odometry.track(0.1 * i, seen_from(31, on_the_way(i), static_cast<unsigned>(i)));
   // Somewhere else all at once, and then nothing to be seen at all.
   const Pose T_wheels = planar_pose(0.6, 0.0, 0.02);
-  const double usual = odometry.find(1.2, seen_from(31, on_the_way(12), 12)).matched;
+  const double usual = odometry.find(1.2, odometry.thinned(seen_from(31, on_the_way(12), 12))).matched;
   const OdometryStep lost = odometry.track(1.2, seen_from(77, SyntheticWorld::at(40, 30, 2.0), 1), T_wheels);
   const OdometryStep blind = odometry.track(1.3, {}, T_wheels);
   for (const OdometryStep& step : {lost, blind}) {

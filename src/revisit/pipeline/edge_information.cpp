@@ -30,10 +30,10 @@ Matrix6 with_at_least(const Matrix6& registration, double metres, double radians
 
 Matrix6 odometry_information(const Pose& T_from_to, const Matrix6& registration) {
   const double way_m = T_from_to.translation().norm();
-  return with_at_least(registration, 0.005 + 0.005 * way_m, to_radians(0.02 + 0.02 * way_m));
+  return with_at_least(registration, 0.003 + 0.002 * way_m, to_radians(0.01 + 0.005 * way_m));
 }
 
-Matrix6 loop_information(const Matrix6& registration) { return with_at_least(registration, 0.05, to_radians(0.15)); }
+Matrix6 loop_information(const Matrix6& registration) { return with_at_least(registration, 0.08, to_radians(0.25)); }
 
 Matrix6 no_information() { return diagonal(100.0, 10.0).inverse(); }
 

@@ -129,8 +129,8 @@ Result<Detection> LoopDetector::detect(const PreparedScan& prepared, const std::
     detection.newest_searchable = index_.newest_searchable(asked, asked_s);
   else if (!T_world_places_.empty())
     detection.newest_searchable = T_world_places_.rbegin()->first;
-  auto candidates = past.is_all ? index_.search_all(prepared.descriptor)
-                                : index_.search(asked, asked_s, prepared.descriptor);
+  auto candidates =
+      past.is_all ? index_.search_all(prepared.descriptor) : index_.search(asked, asked_s, prepared.descriptor);
   if (!candidates) return candidates.error();
   detection.candidates = *std::move(candidates);
   detection.search_ms = watch.lap_ms();
@@ -273,8 +273,7 @@ void LoopDetector::check_temporal_and_scores(FrameId frame, Opinion& opinion) co
   }
 }
 
-Result<std::optional<LoopDetector::Opinion>> LoopDetector::nearer_place(OverheadSearch& overhead,
-                                                                        const Opinion& answer,
+Result<std::optional<LoopDetector::Opinion>> LoopDetector::nearer_place(OverheadSearch& overhead, const Opinion& answer,
                                                                         const Detection& detection) const {
   constexpr double kNear_m = 1.5;
   const Pose& T = answer.geometric->T_match_query;

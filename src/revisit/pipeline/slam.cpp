@@ -39,9 +39,8 @@ Result<SlamStep> Slam::process(Scan scan, const std::optional<Pose>& T_odom_lida
   step.frame = scan.frame;
   filter_range(scan, parameters_.preprocess);
   if (scan.points.empty())
-    return Error{frame_text(scan.frame) + ": no point between " +
-                 std::to_string(parameters_.preprocess.min_range_m) + " and " +
-                 std::to_string(parameters_.preprocess.max_range_m) + " m"};
+    return Error{frame_text(scan.frame) + ": no point between " + std::to_string(parameters_.preprocess.min_range_m) +
+                 " and " + std::to_string(parameters_.preprocess.max_range_m) + " m"};
   Stopwatch watch;
   const double stamp_s = monotone_stamp(scan);
   const bool starts_anew = anew_;
@@ -85,8 +84,9 @@ Result<SlamStep> Slam::process(Scan scan, const std::optional<Pose>& T_odom_lida
 double Slam::monotone_stamp(const Scan& scan) {
   constexpr double kUsualPeriod_s = 0.1;
   if (!last_frame_ || scan.stamp_s > last_stamp_s_) return scan.stamp_s;
-  log_to(log_, LogLevel::kWarning,
-         frame_text(scan.frame) + ": its stamp is not after that of the scan before; taken as a tenth of a second after");
+  log_to(
+      log_, LogLevel::kWarning,
+      frame_text(scan.frame) + ": its stamp is not after that of the scan before; taken as a tenth of a second after");
   return last_stamp_s_ + kUsualPeriod_s;
 }
 
@@ -111,16 +111,18 @@ OdometryStep Slam::track(Scan& scan, double stamp_s, const std::optional<Pose>& 
   motion = T_before_now && follows ? twist_of(*T_before_now, gap_s) : odometry_.expected(stamp_s);
   const Scan raw = is_swept ? scan : Scan{};
   if (motion && is_swept) undistort(scan, *motion);
-  OdometryStep step = odometry_.find(stamp_s, scan.points, T_before_now);
+  OdometryScan thinned = odometry_.thinned(scan.points);
+  OdometryStep step = odometry_.find(stamp_s, thinned, T_before_now);
   // Points stand where the motion had them that was expected: where it was another, once more with that.
   constexpr double kWrong_m = 0.1;
   if (is_swept && follows && step.is_tracked && step.surprise_m > kWrong_m) {
     motion = twist_of(step.T_before_now, gap_s);
     scan = raw;
     undistort(scan, *motion);
-    step = odometry_.find(stamp_s, scan.points, step.T_before_now);
+    thinned = odometry_.thinned(scan.points);
+    step = odometry_.find(stamp_s, thinned, step.T_before_now);
   }
-  odometry_.accept(stamp_s, scan.points, step);
+  odometry_.accept(stamp_s, thinned, step);
   untracked_ = step.is_tracked ? 0 : untracked_ + 1;
   anew_ = untracked_ >= kLostAfter_scans;
   if (anew_) {
@@ -177,8 +179,8 @@ Status Slam::add_keyframe(PreparedScan prepared, const OdometryStep& odometry, b
     // A place that is known is not learnt again: memory stays as it is on known ground.
     constexpr double kSamePlace_m = 1.0, kSameHeading_rad = 0.35;
     const Pose& T = detection->loop->T_match_query;
-    is_known_place = step.loops_entered > 0 && T.translation().norm() < kSamePlace_m &&
-                     rotation_angle(T) < kSameHeading_rad;
+    is_known_place =
+        step.loops_entered > 0 && T.translation().norm() < kSamePlace_m && rotation_angle(T) < kSameHeading_rad;
   }
   if (const Status status = enter(gate_.decide_waiting(false), &step); !status) return status;
   if (const Status status = settle(false); !status) return status;
@@ -188,7 +190,7 @@ Status Slam::add_keyframe(PreparedScan prepared, const OdometryStep& odometry, b
     keyframe.descriptor = to_bytes(prepared.descriptor);
     keyframe.place = to_bytes(prepared.cloud);
     keyframe.cloud =
-        to_map_bytes(thin(prepared.scan.points, prepared.ground.is_ground, parameters_.slam.map_voxel_m));
+        to_map_bytes(thin_surfaces(prepared.scan.points, prepared.ground.is_ground, parameters_.slam.map_voxel_m));
   }
   if (const Status status = store_->add(keyframe); !status) return status;
   if (edge)
@@ -237,8 +239,8 @@ Status Slam::enter(const std::vector<LoopGate::Decision>& decisions, SlamStep* s
     if (step != nullptr) ++step->loops_entered;
     if (!is_attached_ && before_piece_ && before_piece_->first < loop.query) {
       is_attached_ = true;
-      log_to(log_, LogLevel::kInfo, frame_text(loop.query) + ": found again in the map, at frame " +
-                                        std::to_string(loop.match.value));
+      log_to(log_, LogLevel::kInfo,
+             frame_text(loop.query) + ": found again in the map, at frame " + std::to_string(loop.match.value));
     }
   }
   return ok();

@@ -93,9 +93,9 @@ class Slam {
   Pose T_odom_last_ = Pose::Identity(), T_odom_keyframe_ = Pose::Identity();
   Matrix6 information_ = Matrix6::Zero();  ///< of the way since the last key frame, by the scans' registration
   SeenSpace seen_from_keyframe_;
-  int untracked_ = 0;        ///< scans in a row
-  bool anew_ = false;        ///< the next scan begins a new piece
-  bool is_attached_ = true;  ///< the piece hangs together with those before by a loop
+  int untracked_ = 0;                                       ///< scans in a row
+  bool anew_ = false;                                       ///< the next scan begins a new piece
+  bool is_attached_ = true;                                 ///< the piece hangs together with those before by a loop
   std::optional<std::pair<FrameId, double>> before_piece_;  ///< the last key frame before it
   std::size_t loops_unsettled_ = 0, keyframes_unsettled_ = 0;
 };

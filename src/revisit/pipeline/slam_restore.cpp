@@ -69,7 +69,7 @@ Status Slam::restore_odometry(const std::vector<StoredKeyframe>& keyframes) {
     OdometryStep step;
     step.T_odom_lidar = it->T_odom_lidar;
     step.is_tracked = true;
-    odometry_.accept(it->stamp_s, *points, step);
+    odometry_.accept(it->stamp_s, odometry_.thinned(*points), step);
     seen_from_keyframe_ = SeenSpace(*points);
   }
   std::optional<Twist> motion;

@@ -30,6 +30,8 @@ struct ThinCloud {
 /// together. `is_ground` has one entry a point or is empty (nothing is ground). Throws std::invalid_argument for no
 /// voxel size.
 ThinCloud thin(std::span<const Point> points, std::span<const std::uint8_t> is_ground, double voxel_m);
+/// The same without the space that was seen.
+ThinCloud thin_surfaces(std::span<const Point> points, std::span<const std::uint8_t> is_ground, double voxel_m);
 
 /// A thin cloud with what registration needs of it: normals and neighbours. Safe to share between threads.
 class SurfaceCloud final : public Surface {

@@ -37,11 +37,16 @@ struct Voxel {
 }  // namespace
 
 ThinCloud thin(std::span<const Point> points, std::span<const std::uint8_t> is_ground, double voxel_m) {
+  ThinCloud cloud = thin_surfaces(points, is_ground, voxel_m);
+  if (!points.empty()) cloud.seen = SeenSpace(points);
+  return cloud;
+}
+
+ThinCloud thin_surfaces(std::span<const Point> points, std::span<const std::uint8_t> is_ground, double voxel_m) {
   if (!(voxel_m > 0.0)) throw std::invalid_argument("voxels of " + std::to_string(voxel_m) + " m; allowed: above 0");
   ThinCloud cloud;
   cloud.voxel_m = static_cast<float>(voxel_m);
   if (points.empty()) return cloud;
-  cloud.seen = SeenSpace(points);
   Axis x(cloud.voxel_m), y(cloud.voxel_m), z(cloud.voxel_m);
   for (const Point& p : points) {
     x.include(p.x);

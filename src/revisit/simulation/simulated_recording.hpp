@@ -30,7 +30,7 @@ class SimulatedRecording final : public Recording {
   const SimulationOptions& options() const;
   const SensorModel& sensor() const;
   /// Flat, from the first pose on, with slip and a wrong scale.
-  const Trajectory& wheel_odometry() const;
+  const Trajectory& wheel_odometry() const override;
   /// Six degrees of freedom, drifting away slowly.
   const Trajectory& drifting_odometry() const;
 

@@ -20,7 +20,8 @@ class RangeImage {
   Verdict look(const Eigen::Vector3f& p) const;
 
  private:
-  std::vector<float> ranges_m_;  ///< [azimuth][elevation], the least of a cell and those around it; 0: nothing came back
+  std::vector<float>
+      ranges_m_;  ///< [azimuth][elevation], the least of a cell and those around it; 0: nothing came back
 };
 
 /// What a key frame looks like to those before and after it.

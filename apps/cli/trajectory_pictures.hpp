@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+#include <revisit/core/pose.hpp>
+#include <revisit/core/result.hpp>
+#include <revisit/evaluation/trajectory_table.hpp>
+
+namespace revisit::cli {
+
+/// A trajectory and how far it is from the truth.
+struct JudgedTrajectory {
+  Trajectory trajectory;
+  TrajectoryTable table;
+};
+
+/// Side by side, without and with loop closing: the trajectory over the reference, and over the map where `tiles` holds
+/// one. Both start where the reference starts, so that drift shows.
+Status draw_trajectories(const std::filesystem::path& file, const Trajectory& reference, const JudgedTrajectory& before,
+                         const JudgedTrajectory& after, const std::filesystem::path& tiles);
+
+}  // namespace revisit::cli
