@@ -16,6 +16,7 @@ constexpr double kReach_m = 100.0;      // of the map
 constexpr double kForget = 0.1;         // share of the newest in a running mean
 constexpr double kFarSearch_m = 2.0;    // where little is known of the motion
 constexpr double kFewestMatched = 0.3, kUsualSpread = 0.2;
+constexpr double kLongestGuess_s = 5.0;
 constexpr double kLongestGap_s = 1.0;  // beyond, the motion before says nothing about the motion now
 
 double median_range_m(std::span<const Point> points) {
@@ -72,9 +73,11 @@ OdometryStep Odometry::find(double stamp_s, const OdometryScan& scan, const std:
     return step;
   }
   const double voxel_m = map_->voxel_m();
-  const std::optional<Twist> twist = expected(stamp_s);
+  // Over a gap the motion before is a poor guess, and still a better one than none.
+  const double gap_s = stamp_s - last_stamp_s_;
+  const bool goes_on = motion_ && gap_s > 0.0 && gap_s <= kLongestGuess_s;
   const Pose T_moved = T_before_now ? *T_before_now
-                       : twist      ? motion_after(*twist, stamp_s - last_stamp_s_)
+                       : goes_on    ? motion_after(*motion_, gap_s)
                                     : Pose::Identity();
   const auto align = [&](double radius_m, const Pose& T_guess) {
     IcpResult icp = align_icp(*map_, scan.points, T_odom_lidar_ * T_guess,

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/pipeline/slam.hpp>
+
+#include <filesystem>
+
+#include <gtest/gtest.h>
+#include <oneapi/tbb/global_control.h>
+
+#include "synthetic_world.hpp"
+
+namespace revisit {
+namespace {
+
+using testing_support::SyntheticWorld;
+
+constexpr double kStep_m = 0.7;
+constexpr int kOut = 90, kTurn = 30, kScans = 2 * kOut + kTurn;
+
+// Out along x, round on the spot, and back.
+Pose on_the_way(int i) {
+  const double start_m = -35.0, end_m = start_m + kStep_m * kOut;
+  if (i < kOut) return SyntheticWorld::at(start_m + kStep_m * i, 0.0, 0.0);
+  if (i < kOut + kTurn) return SyntheticWorld::at(end_m, 0.0, kPi * (i - kOut) / kTurn);
+  return SyntheticWorld::at(end_m - kStep_m * (i - kOut - kTurn), 0.5, kPi);
+}
+
+Scan scan_at(int i) {
+  static const SyntheticWorld world(61);
+  Scan scan = world.scan(on_the_way(i), {24, 450, -20.0, 6.0}, static_cast<unsigned>(i));
+  scan.frame = FrameId{i};
+  scan.stamp_s = 0.1 * i;
+  return scan;
+}
+
+Parameters parameters() {
+  Parameters p;
+  p.retrieval.exclude_frames = 20;
+  p.retrieval.exclude_s = 2.0;
+  return p;
+}
+
+IntensityScale as_it_is() {
+  IntensityScale scale;
+  scale.full_scale = 1.0;
+  return scale;
+}
+
+struct Drive {
+  explicit Drive(const std::string& name, bool is_new = true) {
+    const auto file = std::filesystem::path(testing::TempDir()) / ("revisit_slam_" + name + ".map");
+    if (is_new)
+      for (const char* ending : {"", "-wal", "-shm"}) std::filesystem::remove(file.string() + ending);
+    auto store = is_new ? MapStore::create(file) : MapStore::open(file);
+    auto started = Slam::start(parameters(), as_it_is(), {}, std::make_shared<MapStore>(*std::move(store)),
+                               Slam::OdometrySource::kLidar, [this](LogLevel, const std::string& text) { log += text + '\n'; });
+    if (started) slam.emplace(*std::move(started));
+  }
+
+  void go(int first, int last) {
+    for (int i = first; i < last; ++i) feed(scan_at(i));
+  }
+  void feed(Scan scan) {
+    const auto step = slam->process(std::move(scan));
+    if (!step) {
+      ++refused;
+      return;
+    }
+    untracked += !step->is_tracked;
+    loops += step->loops_entered;
+    pieces += step->starts_anew;
+  }
+  // The farthest that a pose of these frames is off, from the first pose on.
+  double worst_m(int first, int last) {
+    const auto trajectories = slam->trajectories();
+    EXPECT_TRUE(trajectories);
+    double worst = 0.0;
+    for (int i = first; i < last; ++i)
+      if (const auto found = trajectories->corrected.at({i})) {
+        const Pose truth = on_the_way(0).inverse() * on_the_way(i);
+        worst = std::max(worst, (truth.translation() - found->translation()).norm());
+      }
+    return worst;
+  }
+
+  std::string log;
+  std::optional<Slam> slam;
+  std::size_t loops = 0;
+  int untracked = 0, refused = 0, pieces = 0;
+};
+
+TEST(Slam, GoesOutAndBackAndKnowsIt) {
+  Drive drive("whole");
+  drive.go(0, kScans);
+  ASSERT_TRUE(drive.slam->finish());
+  EXPECT_EQ(drive.untracked, 0);
+  EXPECT_EQ(drive.refused, 0);
+  EXPECT_GT(drive.loops, 10u);
+  EXPECT_LT(drive.worst_m(0, kScans), 0.15) << "over " << 2 * kOut * kStep_m << " m";
+  EXPECT_EQ(drive.slam->trajectories()->corrected.entries.size(), std::size_t{kScans});
+  EXPECT_EQ(drive.slam->graph().nodes().size(), drive.slam->keyframes().size());
+}
+
+TEST(Slam, DoesNotDependOnTheNumberOfThreads) {
+  std::vector<Pose> poses;
+  for (const std::size_t threads : {1, 4}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    Drive drive("threads" + std::to_string(threads));
+    drive.go(0, 40);
+    poses.push_back(drive.slam->trajectories()->corrected.at({39}).value());
+  }
+  EXPECT_EQ(poses[0].matrix(), poses[1].matrix());
+}
+
+TEST(Slam, AGapInWhichNobodyKnowsHowItWent) {
+  Drive drive("gap");
+  drive.go(0, 25);
+  // It stood still and went off elsewhere: 35 m in 5 s.
+  drive.go(75, kScans);
+  ASSERT_TRUE(drive.slam->finish());
+  EXPECT_LT(drive.worst_m(130, kScans), 0.5) << drive.log << "the way back leads to where it was known";
+}
+
+TEST(Slam, DuplicateAndBackwardTimes) {
+  Drive drive("times");
+  for (int i = 0; i < 30; ++i) {
+    Scan scan = scan_at(i);
+    if (i >= 12) scan.stamp_s = 1.1;           // a clock that stands still,
+    if (i >= 20) scan.stamp_s = 0.1 * i - 10.0;  // then one that was set back
+    drive.feed(std::move(scan));
+  }
+  EXPECT_EQ(drive.refused, 0);
+  EXPECT_EQ(drive.untracked, 0);
+  EXPECT_LT(drive.worst_m(0, 30), 0.1);
+  EXPECT_NE(drive.log.find("frame 12: its stamp is not after"), std::string::npos);
+}
+
+TEST(Slam, TwentyEmptyScans) {
+  Drive drive("empty");
+  drive.go(0, 30);
+  for (int i = 30; i < 50; ++i) {
+    Scan empty;
+    empty.frame = FrameId{i};
+    empty.stamp_s = 0.1 * i;
+    drive.feed(std::move(empty));
+  }
+  EXPECT_EQ(drive.refused, 20);
+  drive.go(50, 70);
+  EXPECT_EQ(drive.untracked, 0) << drive.log;
+  EXPECT_LT(drive.worst_m(0, 70), 0.1);
+}
+
+TEST(Slam, ATeleportedRobotFindsItsPlaceAgain) {
+  Drive drive("teleport");
+  drive.go(0, 80);
+  // Back to where it was 40 m before, at once; the scans go on from there under new numbers.
+  for (int i = 0; i < 30; ++i) {
+    Scan scan = scan_at(20 + i);
+    scan.frame = FrameId{80 + i};
+    scan.stamp_s = 8.0 + 0.1 * i;
+    drive.feed(std::move(scan));
+  }
+  ASSERT_TRUE(drive.slam->finish());
+  EXPECT_EQ(drive.pieces, 1) << drive.log;
+  EXPECT_GT(drive.untracked, 0);
+  EXPECT_NE(drive.log.find("found again in the map"), std::string::npos) << drive.log;
+  const Pose found = drive.slam->trajectories()->corrected.at({105}).value();
+  const Pose truth = on_the_way(0).inverse() * on_the_way(45);
+  EXPECT_LT((found.translation() - truth.translation()).norm(), 0.3);
+}
+
+TEST(Slam, GoesOnWhereAKillLeftIt) {
+  std::optional<FrameId> last;
+  {
+    Drive drive("resumed");
+    drive.go(0, 101);  // in the middle of the turn, without finish(): what is not committed is lost
+  }
+  Drive drive("resumed", false);
+  ASSERT_TRUE(drive.slam);
+  last = drive.slam->last_frame();
+  ASSERT_TRUE(last);
+  EXPECT_GT(last->value, 90);
+  drive.go(static_cast<int>(last->value) + 1, kScans);
+  ASSERT_TRUE(drive.slam->finish());
+  EXPECT_EQ(drive.untracked, 0) << drive.log;
+  EXPECT_GT(drive.loops, 10u) << "with places of before";
+  EXPECT_LT(drive.worst_m(0, kScans), 0.2);
+  EXPECT_EQ(drive.slam->trajectories()->corrected.entries.size(), std::size_t{kScans});
+}
+
+TEST(Slam, TakesAnotherOdometryAsItIs) {
+  const auto file = std::filesystem::path(testing::TempDir()) / "revisit_slam_external.map";
+  for (const char* ending : {"", "-wal", "-shm"}) std::filesystem::remove(file.string() + ending);
+  auto slam = Slam::start(parameters(), as_it_is(), {}, std::make_shared<MapStore>(*MapStore::create(file)),
+                          Slam::OdometrySource::kExternal, {});
+  ASSERT_TRUE(slam);
+  const Pose T_elsewhere = planar_pose(100, 50, 2.0);
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(slam->process(scan_at(i), T_elsewhere * on_the_way(i)));
+  const auto trajectories = slam->trajectories();
+  ASSERT_TRUE(trajectories);
+  const Pose truth = on_the_way(0).inverse() * on_the_way(9);
+  EXPECT_TRUE(trajectories->corrected.at({9})->isApprox(truth, 1e-9));
+}
+
+}  // namespace
+}  // namespace revisit
