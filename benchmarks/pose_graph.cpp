@@ -58,7 +58,7 @@ void one_more_loop(benchmark::State& state) {
     edge.is_loop = true;
     more.add_edge(edge);
     state.ResumeTiming();
-    const auto report = more.optimise();
+    const auto report = more.optimise(PoseGraph::kOnline);
     if (!report) return state.SkipWithError(report.error().message.c_str());
     iterations = report->iterations;
   }

@@ -249,7 +249,7 @@ Status Slam::enter(const std::vector<LoopGate::Decision>& decisions, SlamStep* s
 Status Slam::settle(bool is_end) {
   constexpr std::size_t kEvery_keyframes = 20;
   if (loops_unsettled_ == 0 || (!is_end && keyframes_unsettled_ < kEvery_keyframes)) return ok();
-  const auto report = graph_.optimise();
+  const auto report = graph_.optimise(is_end ? PoseGraph::kExactly : PoseGraph::kOnline);
   if (!report) return report.error();
   loops_unsettled_ = keyframes_unsettled_ = 0;
   return ok();

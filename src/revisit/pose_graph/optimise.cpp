@@ -64,7 +64,7 @@ struct Solved {
   std::string message;
 };
 
-Solved solve(std::vector<Block>& blocks, const std::vector<PoseEdge>& edges, int most_iterations) {
+Solved solve(std::vector<Block>& blocks, const std::vector<PoseEdge>& edges, int most_iterations, double settled) {
   ceres::Problem problem;
   auto* const manifold = new ceres::EigenQuaternionManifold;  // NOLINT(cppcoreguidelines-owning-memory): the problem's
   for (Block& block : blocks) {
@@ -84,7 +84,7 @@ Solved solve(std::vector<Block>& blocks, const std::vector<PoseEdge>& edges, int
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   options.logging_type = ceres::SILENT;
   options.max_num_iterations = most_iterations;
-  options.function_tolerance = 1e-5;
+  options.function_tolerance = settled;
   options.num_threads = 2;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
@@ -106,7 +106,7 @@ bool PoseGraph::reweigh(const std::function<double(const PoseEdge&)>& squared, d
   return is_decided;
 }
 
-Result<PoseGraph::Report> PoseGraph::optimise() {
+Result<PoseGraph::Report> PoseGraph::optimise(double settled) {
   Report report;
   if (nodes_.size() < 2) return report;
   std::vector<Block> blocks(nodes_.size());
@@ -125,7 +125,7 @@ Result<PoseGraph::Report> PoseGraph::optimise() {
   const auto squared = [&](const PoseEdge& edge) { return squared_error(edge, pose(edge.from), pose(edge.to)); };
 
   const auto solve_all = [&](int most_iterations) -> Status {
-    const Solved solved = solve(blocks, edges_, most_iterations);
+    const Solved solved = solve(blocks, edges_, most_iterations, settled);
     if (!solved.is_usable) return Error{"pose graph of " + std::to_string(nodes_.size()) + " nodes: " + solved.message};
     if (report.iterations == 0) report.cost_before = solved.cost_before;
     report.iterations += solved.iterations;

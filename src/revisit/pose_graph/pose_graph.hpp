@@ -40,8 +40,10 @@ class PoseGraph {
   };
   /// Moves the nodes to where the measurements agree best. Where loops contradict the rest, these lose their weight, by
   /// graduated non-convexity with truncated least squares (Yang et al., RA-L 2020); where none does, one solution from
-  /// the poses of before is enough. An error where Ceres cannot solve.
-  Result<Report> optimise();
+  /// the poses of before is enough. Settled where a step lowers the cost by a smaller share than `settled`. An error
+  /// where Ceres cannot solve.
+  Result<Report> optimise(double settled = kExactly);
+  static constexpr double kExactly = 1e-6, kOnline = 1e-3;
 
   /// The g2o form (VERTEX_SE3:QUAT, EDGE_SE3:QUAT); edges between nodes that do not follow each other are loops.
   Status write_g2o(const std::filesystem::path& file) const;
