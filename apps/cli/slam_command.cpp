@@ -31,6 +31,10 @@ Result<Trajectory> other_odometry(const Options& options, const Recording& recor
   const std::string& file = options.odometry.empty() ? options.wheels : options.odometry;
   if (file == "none") return Trajectory();
   if (file.empty()) return recording.wheel_odometry();
+  if (file == "wheels") {
+    if (recording.wheel_odometry().empty()) return Error{options.input + ": has no wheel odometry"};
+    return recording.wheel_odometry();
+  }
   const auto poses = read_poses(file);
   if (!poses) return poses.error();
   std::vector<std::pair<FrameId, double>> stamps;
@@ -243,7 +247,7 @@ Run add_slam(CLI::App& program) {
                       "Pose file (TUM, KITTI, g2o) of wheel odometry, in the LiDAR's frame, that helps where scans fail "
                       "(default: the recording's wheel_odometry.tum, if any; none: without)");
   command->add_option("--odometry", options->odometry,
-                      "Pose file of another odometry, taken instead of tracking the scans");
+                      "Pose file of another odometry, taken instead of tracking the scans (wheels: the recording's)");
   command->add_option("--calibration", options->calibration, "Intensity calibration made by `revisit calibrate`");
   command->add_flag("--resume", options->resume, "Go on with the map that is in the folder");
   command->add_flag("--overwrite", options->overwrite, "Replace the map that is in the folder");

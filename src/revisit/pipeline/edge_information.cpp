@@ -18,7 +18,7 @@ Matrix6 diagonal(double metres, double radians) {
 
 Matrix6 with_at_least(const Matrix6& registration, double metres, double radians) {
   Matrix6 covariance = diagonal(metres, radians);
-  // Without any information (another odometry's motion) the least is all that is known.
+  // Without any information the least is all that is known.
   if (!registration.isZero())
     covariance += kOverconfidence * kOverconfidence *
                   (registration + Matrix6(diagonal(kNothing_m, kNothing_rad).inverse())).inverse();
@@ -31,6 +31,11 @@ Matrix6 with_at_least(const Matrix6& registration, double metres, double radians
 Matrix6 odometry_information(const Pose& T_from_to, const Matrix6& registration) {
   const double way_m = T_from_to.translation().norm();
   return with_at_least(registration, 0.003 + 0.002 * way_m, to_radians(0.01 + 0.005 * way_m));
+}
+
+Matrix6 external_odometry_information(const Pose& T_from_to) {
+  const double way_m = T_from_to.translation().norm();
+  return with_at_least(Matrix6::Zero(), 0.01 + 0.03 * way_m, to_radians(0.05 + 0.1 * way_m));
 }
 
 Matrix6 loop_information(const Matrix6& registration) { return with_at_least(registration, 0.08, to_radians(0.25)); }

@@ -10,6 +10,8 @@ namespace revisit {
 
 /// Of the way between key frames, T_from_to; `registration` is the information of the last scan in it.
 Matrix6 odometry_information(const Pose& T_from_to, const Matrix6& registration);
+/// The same of an odometry that nobody here knows: wheels, for instance, which slip.
+Matrix6 external_odometry_information(const Pose& T_from_to);
 Matrix6 loop_information(const Matrix6& registration);
 /// Of a way that nobody measured.
 Matrix6 no_information();

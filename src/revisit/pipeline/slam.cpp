@@ -53,7 +53,6 @@ Result<SlamStep> Slam::process(Scan scan, const std::optional<Pose>& T_odom_lida
   last_stamp_s_ = stamp_s;
   if (T_odom_lidar) T_prior_last_ = T_odom_lidar;
   T_odom_last_ = odometry.T_odom_lidar;
-  information_ = odometry.information;
   step.is_tracked = odometry.is_tracked;
 
   // Until it is known how well intensities agree with this sensor, every scan is looked at for that.
@@ -206,7 +205,9 @@ Status Slam::add_keyframe(PreparedScan prepared, const OdometryStep& odometry, b
 
 StoredEdge Slam::edge_from_last(const StoredKeyframe& keyframe, const Matrix6& information) const {
   StoredEdge edge{keyframes_.back(), keyframe.frame, T_odom_keyframe_.inverse() * keyframe.T_odom_lidar, {}, {}};
-  edge.information = keyframe.starts_anew ? no_information() : odometry_information(edge.T_from_to, information);
+  edge.information = keyframe.starts_anew                    ? no_information()
+                     : source_ == OdometrySource::kExternal ? external_odometry_information(edge.T_from_to)
+                                                            : odometry_information(edge.T_from_to, information);
   return edge;
 }
 

@@ -91,7 +91,6 @@ class Slam {
   double last_stamp_s_ = 0.0;
   std::optional<Pose> T_prior_last_;
   Pose T_odom_last_ = Pose::Identity(), T_odom_keyframe_ = Pose::Identity();
-  Matrix6 information_ = Matrix6::Zero();  ///< of the way since the last key frame, by the scans' registration
   SeenSpace seen_from_keyframe_;
   int untracked_ = 0;                                       ///< scans in a row
   bool anew_ = false;                                       ///< the next scan begins a new piece
