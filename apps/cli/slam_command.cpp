@@ -62,8 +62,9 @@ Result<std::shared_ptr<MapStore>> open_store(const Options& options) {
   if (exists && options.overwrite && !options.resume)
     for (const char* ending : {"", "-wal", "-shm"}) fs::remove(file.string() + ending, failure);
   else if (exists && !options.resume)
-    return Error{options.out + ": already holds a map; go on with it by --resume, replace it by --overwrite, or name "
-                               "another folder"};
+    return Error{options.out +
+                 ": already holds a map; go on with it by --resume, replace it by --overwrite, or name "
+                 "another folder"};
   auto store = fs::exists(file, failure) ? MapStore::open(file) : MapStore::create(file);
   if (!store) return store.error();
   return std::make_shared<MapStore>(*std::move(store));
@@ -130,10 +131,10 @@ Status write_trajectories(const Slam& slam, const Recording& recording, const fs
   const auto T_camera_lidar = recording.T_camera_lidar();
   if (T_camera_lidar)
     if (const Status status = write_camera_calibration(out / "calib.txt", *T_camera_lidar); !status) return status;
-  for (const Status& status : {write_kitti_poses(out / "poses.txt", trajectories->corrected, T_camera_lidar),
-                               write_tum_poses(out / "poses.tum", trajectories->corrected),
-                               write_tum_poses(out / "odometry.tum", trajectories->odometry),
-                               slam.graph().write_g2o(out / "graph.g2o")})
+  for (const Status& status :
+       {write_kitti_poses(out / "poses.txt", trajectories->corrected, T_camera_lidar),
+        write_tum_poses(out / "poses.tum", trajectories->corrected),
+        write_tum_poses(out / "odometry.tum", trajectories->odometry), slam.graph().write_g2o(out / "graph.g2o")})
     if (!status) return status;
   return ok();
 }
@@ -231,7 +232,8 @@ Run add_slam(CLI::App& program) {
   auto options = std::make_shared<Options>();
   CLI::App* command = program.add_subcommand("slam", "Turn a recording into a corrected trajectory and a map.");
   command->footer(
-      "Scans are tracked against what was seen lately, loops correct what has drifted. Writes into the folder of --out\n"
+      "Scans are tracked against what was seen lately, loops correct what has drifted. Writes into the folder of "
+      "--out\n"
       "(formats: docs/formats.md):\n"
       "  poses.txt/.tum   the corrected trajectory\n"
       "  odometry.tum     the trajectory before any loop\n"
@@ -243,9 +245,10 @@ Run add_slam(CLI::App& program) {
       "         revisit evaluate maps/00 --reference kitti/poses/00.txt");
   command->add_option("input", options->input, "Recording, as for `revisit detect`")->required();
   command->add_option("--out", options->out, "Folder for the results")->required();
-  command->add_option("--wheels", options->wheels,
-                      "Pose file (TUM, KITTI, g2o) of wheel odometry, in the LiDAR's frame, that helps where scans fail "
-                      "(default: the recording's wheel_odometry.tum, if any; none: without)");
+  command->add_option(
+      "--wheels", options->wheels,
+      "Pose file (TUM, KITTI, g2o) of wheel odometry, in the LiDAR's frame, that helps where scans fail "
+      "(default: the recording's wheel_odometry.tum, if any; none: without)");
   command->add_option("--odometry", options->odometry,
                       "Pose file of another odometry, taken instead of tracking the scans (wheels: the recording's)");
   command->add_option("--calibration", options->calibration, "Intensity calibration made by `revisit calibrate`");

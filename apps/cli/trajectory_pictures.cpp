@@ -42,7 +42,8 @@ Status draw_trajectories(const std::filesystem::path& file, const Trajectory& re
       y = {std::min(y.min, p.y()), std::max(y.max, p.y())};
     }
   };
-  const Pose T_before = from_the_start(reference, before.trajectory), T_after = from_the_start(reference, after.trajectory);
+  const Pose T_before = from_the_start(reference, before.trajectory),
+             T_after = from_the_start(reference, after.trajectory);
   cover(reference, Pose::Identity());
   cover(before.trajectory, T_before);
   const double margin_m = std::max({5.0, 0.05 * (x.max - x.min), 0.05 * (y.max - y.min)});

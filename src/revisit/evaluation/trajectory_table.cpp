@@ -62,8 +62,8 @@ TrajectoryTable evaluate_trajectory(const Trajectory& estimate, const Trajectory
       const auto end = std::find_if(pairs.begin() + static_cast<std::ptrdiff_t>(i), pairs.end(),
                                     [&](const Pair& pair) { return pair.way_m > pairs[i].way_m + length_m; });
       if (end == pairs.end()) break;
-      const Pose error = (pairs[i].reference.inverse() * end->reference).inverse() *
-                         (pairs[i].estimate.inverse() * end->estimate);
+      const Pose error =
+          (pairs[i].reference.inverse() * end->reference).inverse() * (pairs[i].estimate.inverse() * end->estimate);
       percent += 100.0 * error.translation().norm() / length_m;
       deg_per_m += to_degrees(rotation_angle(error)) / length_m;
       ++count;

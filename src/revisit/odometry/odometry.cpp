@@ -11,11 +11,11 @@
 namespace revisit {
 namespace {
 
-constexpr double kPartsOfAVoxel = 2.0;  // along an edge: points that the map is given
-constexpr double kReach_m = 100.0;      // of the map
-constexpr double kForget = 0.1;         // share of the newest in a running mean
-constexpr double kFarSearch_m = 2.0;    // where little is known of the motion
-constexpr double kFewestMatched = 0.3, kUsualSpread = 0.2;
+constexpr double kPartsOfAVoxel = 2.0;                      // along an edge: points that the map is given
+constexpr double kReach_m = 100.0;                          // of the map
+constexpr double kForget = 0.1;                             // share of the newest in a running mean
+constexpr double kFarSearch_m = 2.0;                        // where little is known of the motion
+constexpr double kFewestMatched = 0.3, kUsualSpread = 0.2;  // of a scan's points
 constexpr double kLongestGuess_s = 5.0;
 constexpr double kLongestGap_s = 1.0;  // beyond, the motion before says nothing about the motion now
 
@@ -63,6 +63,14 @@ double Odometry::search_radius_m() const {
   return std::clamp(kSigmas * std::sqrt(squared_surprise_m2_), kLeastVoxels * map_->voxel_m(), kFarSearch_m);
 }
 
+bool Odometry::is_believed(double matched, double met) const {
+  // The first scans of a sparse sensor meet few surfaces; those that they meet must fit.
+  constexpr int kFirst_scans = 5;
+  constexpr double kFewestAtFirst = 0.1, kFittingAtFirst = 0.6;
+  if (scans_ < kFirst_scans) return matched >= kFewestAtFirst && matched >= kFittingAtFirst * met;
+  return matched >= std::max(kFewestMatched, usual_match_ - kUsualSpread);
+}
+
 OdometryStep Odometry::find(double stamp_s, const OdometryScan& scan, const std::optional<Pose>& T_before_now) const {
   OdometryStep step;
   step.T_odom_lidar = T_odom_lidar_;
@@ -76,9 +84,7 @@ OdometryStep Odometry::find(double stamp_s, const OdometryScan& scan, const std:
   // Over a gap the motion before is a poor guess, and still a better one than none.
   const double gap_s = stamp_s - last_stamp_s_;
   const bool goes_on = motion_ && gap_s > 0.0 && gap_s <= kLongestGuess_s;
-  const Pose T_moved = T_before_now ? *T_before_now
-                       : goes_on    ? motion_after(*motion_, gap_s)
-                                    : Pose::Identity();
+  const Pose T_moved = T_before_now ? *T_before_now : goes_on ? motion_after(*motion_, gap_s) : Pose::Identity();
   const auto align = [&](double radius_m, const Pose& T_guess) {
     IcpResult icp = align_icp(*map_, scan.points, T_odom_lidar_ * T_guess,
                               {.coarse_m = radius_m,
@@ -89,9 +95,7 @@ OdometryStep Odometry::find(double stamp_s, const OdometryScan& scan, const std:
     icp.converged = icp.converged || (icp.information(0, 0) > 0.0 && icp.last_step_m < kSteady_m);
     return icp;
   };
-  const auto fits = [&](const IcpResult& icp) {
-    return icp.converged && icp.matched >= std::max(kFewestMatched, usual_match_ - kUsualSpread);
-  };
+  const auto fits = [&](const IcpResult& icp) { return icp.converged && is_believed(icp.matched, icp.met); };
   IcpResult icp = align(search_radius_m(), T_moved);
   // A turn or a jolt that was not foreseen, or the end of one.
   for (const Pose& T_guess : {T_moved, Pose::Identity()}) {
@@ -100,15 +104,17 @@ OdometryStep Odometry::find(double stamp_s, const OdometryScan& scan, const std:
     if (fits(other) || other.matched > icp.matched) icp = other;
   }
   step.matched = icp.matched;
+  step.met = icp.met;
   step.is_tracked = fits(icp);
   step.T_before_now = T_moved;
   step.T_odom_lidar = T_odom_lidar_ * T_moved;
+  step.T_before_found = T_odom_lidar_.inverse() * icp.T_target_source;
+  const Pose surprise = T_moved.inverse() * step.T_before_found;
+  step.surprise_m = surprise.translation().norm() + rotation_angle(surprise) * range_m_;
   if (step.is_tracked) {
     step.T_odom_lidar = icp.T_target_source;
-    step.T_before_now = T_odom_lidar_.inverse() * icp.T_target_source;
+    step.T_before_now = step.T_before_found;
     step.information = icp.information;
-    const Pose surprise = T_moved.inverse() * step.T_before_now;
-    step.surprise_m = surprise.translation().norm() + rotation_angle(surprise) * range_m_;
   }
   // Poses are made from poses scan after scan: what rounding does to a rotation must not build up.
   step.T_odom_lidar.linear() = Eigen::Quaterniond(step.T_odom_lidar.linear()).normalized().toRotationMatrix();

@@ -21,12 +21,14 @@ struct OdometryScan {
 
 /// Where one scan was found to be.
 struct OdometryStep {
-  Pose T_odom_lidar = Pose::Identity();   ///< at the scan's stamp; the first scan is the origin
-  Pose T_before_now = Pose::Identity();   ///< since the scan before
-  Matrix6 information = Matrix6::Zero();  ///< of T_before_now, as in LoopConstraint
-  double matched = 0.0;                   ///< share of the scan's surface points that met the map
-  double surprise_m = 0.0;                ///< how far the motion was from the one expected, of points at usual range
-  bool is_tracked = false;                ///< otherwise the pose is the one that was expected
+  Pose T_odom_lidar = Pose::Identity();    ///< at the scan's stamp; the first scan is the origin
+  Pose T_before_now = Pose::Identity();    ///< since the scan before
+  Pose T_before_found = Pose::Identity();  ///< since the scan before, as registration has it, believed or not
+  Matrix6 information = Matrix6::Zero();   ///< of T_before_now, as in LoopConstraint
+  double matched = 0.0;                    ///< share of the scan's points that lie on a surface of the map
+  double met = 0.0;                        ///< share with a surface of the map nearby at all
+  double surprise_m = 0.0;                 ///< how far what was found is from what was expected, at the median range
+  bool is_tracked = false;                 ///< otherwise the pose is the one that was expected
 };
 
 /// Tracks a LiDAR against the map of what it saw lately. Nothing to tune: the map's voxels follow from how far the
@@ -56,6 +58,7 @@ class Odometry {
 
  private:
   double search_radius_m() const;
+  bool is_believed(double matched, double met) const;
 
   std::optional<LocalMap> map_;
   Pose T_odom_lidar_ = Pose::Identity();
@@ -64,7 +67,7 @@ class Odometry {
   double last_stamp_s_ = 0.0, range_m_ = 0.0;
   double squared_surprise_m2_ = 0.0;  ///< running mean of how far expectation was off
   double usual_match_ = 0.0;          ///< running mean of the share that met the map
-  int scans_ = 0;
+  int scans_ = 0;                     ///< in the map
 };
 
 }  // namespace revisit

@@ -106,21 +106,33 @@ OdometryStep Slam::track(Scan& scan, double stamp_s, const std::optional<Pose>& 
     if (follows) motion = twist_of(step.T_before_now, gap_s);
     return step;
   }
-  const bool is_swept = !scan.times_s.empty();
+  const bool is_swept = !scan.times_s.empty() && follows;
   motion = T_before_now && follows ? twist_of(*T_before_now, gap_s) : odometry_.expected(stamp_s);
   const Scan raw = is_swept ? scan : Scan{};
-  if (motion && is_swept) undistort(scan, *motion);
+  if (motion && is_swept) {
+    undistort(scan, *motion);
+    if (first_scan_) start_again_with(*motion);
+  }
   OdometryScan thinned = odometry_.thinned(scan.points);
   OdometryStep step = odometry_.find(stamp_s, thinned, T_before_now);
   // Points stand where the motion had them that was expected: where it was another, once more with that.
   constexpr double kWrong_m = 0.1;
-  if (is_swept && follows && step.is_tracked && step.surprise_m > kWrong_m) {
-    motion = twist_of(step.T_before_now, gap_s);
-    scan = raw;
-    undistort(scan, *motion);
-    thinned = odometry_.thinned(scan.points);
-    step = odometry_.find(stamp_s, thinned, step.T_before_now);
+  if (is_swept && step.surprise_m > kWrong_m) {
+    const Twist found = twist_of(step.T_before_found, gap_s);
+    Scan swept_so = raw;
+    undistort(swept_so, found);
+    if (first_scan_) start_again_with(found);
+    OdometryScan thinned_so = odometry_.thinned(swept_so.points);
+    const OdometryStep so = odometry_.find(stamp_s, thinned_so, step.T_before_found);
+    if (so.is_tracked) {
+      step = so;
+      motion = found;
+      scan = std::move(swept_so);
+      thinned = std::move(thinned_so);
+    }
   }
+  first_scan_.reset();
+  if (!odometry_.map() && !motion) first_scan_ = scan;
   odometry_.accept(stamp_s, thinned, step);
   untracked_ = step.is_tracked ? 0 : untracked_ + 1;
   anew_ = untracked_ >= kLostAfter_scans;
@@ -132,6 +144,17 @@ OdometryStep Slam::track(Scan& scan, double stamp_s, const std::optional<Pose>& 
     untracked_ = 0;
   }
   return step;
+}
+
+// The first scan went into the map as it was swept: now that the motion is known, it goes in as it was seen.
+void Slam::start_again_with(const Twist& motion) {
+  undistort(*first_scan_, motion);
+  OdometryStep first;
+  first.T_odom_lidar = T_odom_last_;
+  first.is_tracked = true;
+  odometry_.restart();
+  odometry_.accept(last_stamp_s_, odometry_.thinned(first_scan_->points), first);
+  first_scan_.reset();
 }
 
 bool Slam::is_keyframe(const OdometryStep& step, const Scan& swept) const {
@@ -205,7 +228,7 @@ Status Slam::add_keyframe(PreparedScan prepared, const OdometryStep& odometry, b
 
 StoredEdge Slam::edge_from_last(const StoredKeyframe& keyframe, const Matrix6& information) const {
   StoredEdge edge{keyframes_.back(), keyframe.frame, T_odom_keyframe_.inverse() * keyframe.T_odom_lidar, {}, {}};
-  edge.information = keyframe.starts_anew                    ? no_information()
+  edge.information = keyframe.starts_anew                   ? no_information()
                      : source_ == OdometrySource::kExternal ? external_odometry_information(edge.T_from_to)
                                                             : odometry_information(edge.T_from_to, information);
   return edge;

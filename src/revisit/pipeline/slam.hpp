@@ -69,6 +69,7 @@ class Slam {
   double monotone_stamp(const Scan& scan);
   std::optional<Pose> prior(const std::optional<Pose>& T_odom_lidar) const;
   OdometryStep track(Scan& scan, double stamp_s, const std::optional<Pose>& T_before_now, std::optional<Twist>& motion);
+  void start_again_with(const Twist& motion);
   bool is_keyframe(const OdometryStep& step, const Scan& swept) const;
   Status add_keyframe(PreparedScan prepared, const OdometryStep& odometry, bool starts_anew, SlamStep& step);
   void add_to_graph(const StoredKeyframe& keyframe, const std::optional<StoredEdge>& from_last);
@@ -92,9 +93,10 @@ class Slam {
   std::optional<Pose> T_prior_last_;
   Pose T_odom_last_ = Pose::Identity(), T_odom_keyframe_ = Pose::Identity();
   SeenSpace seen_from_keyframe_;
-  int untracked_ = 0;                                       ///< scans in a row
-  bool anew_ = false;                                       ///< the next scan begins a new piece
-  bool is_attached_ = true;                                 ///< the piece hangs together with those before by a loop
+  std::optional<Scan> first_scan_;  ///< of a piece, as it was swept, until the second one is there
+  int untracked_ = 0;               ///< scans in a row
+  bool anew_ = false;               ///< the next scan begins a new piece
+  bool is_attached_ = true;         ///< the piece hangs together with those before by a loop
   std::optional<std::pair<FrameId, double>> before_piece_;  ///< the last key frame before it
   std::size_t loops_unsettled_ = 0, keyframes_unsettled_ = 0;
 };

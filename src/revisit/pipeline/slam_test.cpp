@@ -51,8 +51,9 @@ struct Drive {
     if (is_new)
       for (const char* ending : {"", "-wal", "-shm"}) std::filesystem::remove(file.string() + ending);
     auto store = is_new ? MapStore::create(file) : MapStore::open(file);
-    auto started = Slam::start(parameters(), as_it_is(), {}, std::make_shared<MapStore>(*std::move(store)),
-                               Slam::OdometrySource::kLidar, [this](LogLevel, const std::string& text) { log += text + '\n'; });
+    auto started =
+        Slam::start(parameters(), as_it_is(), {}, std::make_shared<MapStore>(*std::move(store)),
+                    Slam::OdometrySource::kLidar, [this](LogLevel, const std::string& text) { log += text + '\n'; });
     if (started) slam.emplace(*std::move(started));
   }
 
@@ -124,7 +125,7 @@ TEST(Slam, DuplicateAndBackwardTimes) {
   Drive drive("times");
   for (int i = 0; i < 30; ++i) {
     Scan scan = scan_at(i);
-    if (i >= 12) scan.stamp_s = 1.1;           // a clock that stands still,
+    if (i >= 12) scan.stamp_s = 1.1;             // a clock that stands still,
     if (i >= 20) scan.stamp_s = 0.1 * i - 10.0;  // then one that was set back
     drive.feed(std::move(scan));
   }

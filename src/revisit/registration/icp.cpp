@@ -119,7 +119,11 @@ bool step(const Surface& target, Points source, const IcpOptions& options, doubl
         a.add(b);
         return a;
       });
-  if (!source.empty()) result.matched = sum.weights * static_cast<double>(stride) / static_cast<double>(source.size());
+  if (!source.empty()) {
+    const double share = static_cast<double>(stride) / static_cast<double>(source.size());
+    result.matched = share * sum.weights;
+    result.met = share * static_cast<double>(sum.pairs);
+  }
   constexpr std::size_t kFewestPairs = 20;
   if (sum.pairs < kFewestPairs) return false;
   result.information = information_of(sum, T);

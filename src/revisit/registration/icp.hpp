@@ -15,6 +15,7 @@ struct IcpResult {
   double last_step_m = 0.0;  ///< how far the last step moved points 20 m away
   /// Share of the source's points that lie on a patch, each counted by its weight in the last step.
   double matched = 0.0;
+  double met = 0.0;  ///< share of them with any patch within reach, however far from its plane
   /// Inverse covariance of xi where the true pose is T_target_source * small_motion(xi): metres, then radians, in the
   /// source's frame. Small along what the scans do not fix. Zero where too few points met.
   Matrix6 information = Matrix6::Zero();
