@@ -34,6 +34,22 @@ TEST(Odometry, FollowsABend) {
   EXPECT_LT(to_degrees(rotation_angle(error)), 0.5);
 }
 
+// Turns and translations about an origin far away are nearly the same: they must not be solved for there.
+TEST(Odometry, FollowsAsWellFarFromTheOrigin) {
+  Odometry odometry;
+  Pose T_far = planar_pose(4000.0, -3000.0, 2.0);
+  odometry.stand_at(-0.1, T_far, std::nullopt);
+  Pose T_found = T_far;
+  for (int i = 0; i < 15; ++i) {
+    const Pose T_wheels = i == 0 ? Pose(Pose::Identity())
+                                 : on_the_way(i - 1).inverse() * on_the_way(i) * planar_pose(0.1, 0.0, to_radians(2.0));
+    T_found = odometry.track(0.1 * i, seen_from(31, on_the_way(i), static_cast<unsigned>(i)), T_wheels).T_odom_lidar;
+  }
+  const Pose error = (on_the_way(0).inverse() * on_the_way(14)).inverse() * (T_far.inverse() * T_found);
+  EXPECT_LT(error.translation().norm(), 0.01 * 0.6 * 14);
+  EXPECT_LT(to_degrees(rotation_angle(error)), 0.5);
+}
+
 TEST(Odometry, SaysWhenItIsLostAndKeepsWhatWheelsSay) {
   Odometry odometry;
   for (int i = 0; i < 12; ++i) odometry.track(0.1 * i, seen_from(31, on_the_way(i), static_cast<unsigned>(i)));

@@ -16,7 +16,9 @@ namespace {
 constexpr double kAllPointsBelow_m = 1.0;
 constexpr float kSeenMargin_m = 1.f;  // what ranges within a cell of seen space may be off
 
-// The normal equations of a Gauss-Newton step in the target's frame (metres, then radians), summed over points.
+// The normal equations of a Gauss-Newton step (metres, then radians about the source's origin, both along the target's
+// axes), summed over points. About the target's origin, which a map may have a kilometre away, turns and translations
+// would be next to inseparable.
 struct Equations {
   Matrix6 H = Matrix6::Zero();
   Vector6 g = Vector6::Zero();
@@ -70,7 +72,7 @@ Equations equations_of(const Surface& target, Points source, Points source_norma
     if (n.squaredNorm() < 0.5) continue;
     if (source_normals.empty()) {
       Vector6 J;
-      J << n, p.cross(n);
+      J << n, (p - T.translation()).cross(n);
       const double residual = n.dot(d);
       const double weight = sum.weigh(residual * residual, shrink);
       sum.H.noalias() += (weight * J) * J.transpose();
@@ -78,7 +80,7 @@ Equations equations_of(const Surface& target, Points source, Points source_norma
     } else {
       const Eigen::Matrix3d metric = plane_to_plane(n, T.linear() * source_normals[i].cast<double>());
       Eigen::Matrix<double, 3, 6> J;
-      J << Eigen::Matrix3d::Identity(), -cross_matrix(p);
+      J << Eigen::Matrix3d::Identity(), -cross_matrix(p - T.translation());
       const double weight = sum.weigh(d.dot(metric * d), shrink);
       sum.H.noalias() += weight * J.transpose() * metric * J;
       sum.g.noalias() += weight * J.transpose() * (metric * d);
@@ -93,11 +95,9 @@ Equations equations_of(const Surface& target, Points source, Points source_norma
 Matrix6 information_of(const Equations& sum, const Pose& T) {
   constexpr double kPointsThatCountAsOne = 10.0, kLeastNoise_m = 0.02;
   const double variance_m2 = std::max(kLeastNoise_m * kLeastNoise_m, sum.weighted_squares_m2 / sum.weights);
-  // T * small_motion(xi) = small_motion(adjoint * xi) * T
-  Matrix6 adjoint = Matrix6::Zero();
-  adjoint.topLeftCorner<3, 3>() = adjoint.bottomRightCorner<3, 3>() = T.linear();
-  adjoint.topRightCorner<3, 3>() = cross_matrix(T.translation()) * T.linear();
-  return adjoint.transpose() * sum.H * adjoint / (kPointsThatCountAsOne * variance_m2);
+  Matrix6 axes = Matrix6::Zero();
+  axes.topLeftCorner<3, 3>() = axes.bottomRightCorner<3, 3>() = T.linear();
+  return axes.transpose() * sum.H * axes / (kPointsThatCountAsOne * variance_m2);
 }
 
 // One Gauss-Newton step; false where the points do not fix the pose.
@@ -130,7 +130,9 @@ bool step(const Surface& target, Points source, const IcpOptions& options, doubl
   sum.H.diagonal().array() += 1e-6 * sum.H.diagonal().maxCoeff();  // a direction that nothing sees stays where it was
   const Vector6 xi = sum.H.ldlt().solve(-sum.g);
   if (!xi.allFinite()) return false;
-  T = small_motion(xi) * T;
+  const Pose small = small_motion(xi);
+  T.linear() = small.linear() * T.linear();
+  T.translation() += small.translation();
   moved = xi.tail<3>().norm() * 20.0 + xi.head<3>().norm();  // metres, of a point 20 m away
   return true;
 }
