@@ -185,6 +185,7 @@ Status LoopDetector::verify(Detection& detection, const PreparedScan& prepared) 
       register_one(opinions[i], what_neighbours_say(detection.frame, opinions[i].candidate.match));
   });
 
+  weigh_against_each_other(detection.frame, opinions);
   for (const Opinion& each : opinions)
     if (each.geometric) detection.registered.push_back({each.candidate.match, *each.geometric});
 
@@ -222,6 +223,27 @@ Status LoopDetector::verify(Detection& detection, const PreparedScan& prepared) 
                        found.evidence.rmse_m, found.probability,      found.information};
   }
   return ok();
+}
+
+void LoopDetector::weigh_against_each_other(FrameId query, std::vector<Opinion>& opinions) const {
+  // Where a scene shows little, even the right place fits poorly; that all others fit far worse speaks for it then.
+  // Chosen on recordings that no reported figure uses (docs/accuracy.md).
+  constexpr double kNothingBelow = 8.0, kShare = 0.5, kMost = 5.0;
+  for (Opinion& each : opinions) {
+    if (!each.geometric) continue;
+    const double own = loop_log_odds(each.geometric->evidence);
+    std::optional<double> runner_up;
+    for (const Opinion& other : opinions)
+      if (other.geometric &&
+          std::abs(other.candidate.match.value - each.candidate.match.value) > parameters_.retrieval.separation_frames)
+        runner_up = std::max(runner_up.value_or(-1e9), loop_log_odds(other.geometric->evidence));
+    if (!runner_up) continue;
+    const double says = std::clamp(kShare * (own - *runner_up - kNothingBelow), 0.0, kMost);
+    if (says > what_neighbours_say(query, each.candidate.match)) {
+      judge(*each.geometric, says, parameters_.geometric);
+      each.reason = each.geometric->reason;
+    }
+  }
 }
 
 double LoopDetector::what_neighbours_say(FrameId query, FrameId match) const {

@@ -102,6 +102,8 @@ class LoopDetector {
   };
 
   Status verify(Detection& detection, const PreparedScan& prepared);
+  // A candidate that fits far better than those elsewhere is the likelier for it: ambiguity against the runner-up.
+  void weigh_against_each_other(FrameId query, std::vector<Opinion>& opinions) const;
   // Log odds in favour of the match that the scans shortly before give, which were found next to it or were not.
   double what_neighbours_say(FrameId query, FrameId match) const;
   void look_from_overhead(OverheadSearch& overhead, const ThinCloud& place, Opinion& opinion) const;

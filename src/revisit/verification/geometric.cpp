@@ -17,7 +17,7 @@ std::string format(const char* pattern, Values... values) {
   return text;
 }
 
-std::string reason_to_refuse(const GeometricEvidence& found, bool converged, const GeometricOptions& options) {
+std::string reason_to_refuse(const GeometricEvidence& found, const GeometricOptions& options) {
   const LoopEvidence& evidence = found.evidence;
   if (evidence.inlier_ratio < options.min_inlier_ratio)
     return format("inlier ratio %.2f below %.2f", evidence.inlier_ratio, options.min_inlier_ratio);
@@ -25,7 +25,7 @@ std::string reason_to_refuse(const GeometricEvidence& found, bool converged, con
     return format("probability %.3f below %.3f (inliers %.2f; free space %.2f; intensity %.2f; rmse %.2f m)",
                   found.probability, options.min_probability, evidence.inlier_ratio, evidence.free_space_agreement,
                   evidence.intensity_agreement.value_or(0.0), evidence.rmse_m);
-  if (!converged) return "registration did not converge";
+  if (!found.has_converged) return "registration did not converge";
   if (evidence.distance_m > options.max_translation_m)
     return format("translation %.1f m above %.1f m", evidence.distance_m, options.max_translation_m);
   return {};
@@ -48,14 +48,19 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
   all.rmse_m = agreement.rmse_m;
   all.overlap = view.overlap;
   all.distance_m = icp.T_target_source.translation().norm();
-  evidence.log_odds = loop_log_odds(all) + view.prior_log_odds;
-  evidence.probability = probability_of(evidence.log_odds);
-  evidence.reason = reason_to_refuse(evidence, icp.converged, options);
-  evidence.consistent = evidence.reason.empty();
+  evidence.has_converged = icp.converged;
+  judge(evidence, view.prior_log_odds, options);
   return evidence;
 }
 
 }  // namespace
+
+void judge(GeometricEvidence& found, double prior_log_odds, const GeometricOptions& options) {
+  found.log_odds = loop_log_odds(found.evidence) + prior_log_odds;
+  found.probability = probability_of(found.log_odds);
+  found.reason = reason_to_refuse(found, options);
+  found.consistent = found.reason.empty();
+}
 
 GeometricEvidence check_geometric(const ScanGeometry& match, const ScanGeometry& query, const CandidateView& view,
                                   const GeometricOptions& options) {

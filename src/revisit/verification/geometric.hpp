@@ -17,6 +17,7 @@ struct GeometricEvidence {
   Matrix6 information = Matrix6::Zero();     ///< of the pose, as in LoopConstraint
   LoopEvidence evidence;                     ///< what speaks for it
   double log_odds = 0.0, probability = 0.0;  ///< that follow from it and from the prior
+  bool has_converged = false;
   int icp_iterations = 0;
   std::size_t feature_matches = 0, feature_inliers = 0;  ///< FPFH; 0 where it found no transform
   bool from_features = false;  ///< ICP started from FPFH's transform, not from the descriptor's yaw
@@ -31,7 +32,7 @@ struct CandidateView {
   double overlap = 0.8;  ///< of both scans seen from overhead; as usual, where nobody looked
   /// The correlation of intensities that consecutive scans show with this sensor.
   double usual_intensity_correlation = 0.95;
-  double prior_log_odds = 0.0;  ///< what else makes it likely: its neighbours in time
+  double prior_log_odds = 0.0;  ///< what else makes it likely: its neighbours in time, that no other place fits
 };
 
 /// Geometric consistency (paper, section III-D): registers the query onto the match by ICP, from the guess; with
@@ -39,5 +40,8 @@ struct CandidateView {
 /// Judges the better of both. Deterministic; one thread a scan.
 GeometricEvidence check_geometric(const ScanGeometry& match, const ScanGeometry& query, const CandidateView& view,
                                   const GeometricOptions& options);
+
+/// Judges anew what was registered, with all that makes it likely besides (log odds).
+void judge(GeometricEvidence& found, double prior_log_odds, const GeometricOptions& options);
 
 }  // namespace revisit

@@ -88,5 +88,32 @@ TEST(GeometricConsistency, NothingToRegister) {
   EXPECT_FALSE(check_geometric(nothing, match, {planar_pose(0, 0, 0.0)}, {}).consistent);
 }
 
+TEST(Judge, WhatIsKnownBesidesDecidesWhereTheScansLeaveItOpen) {
+  GeometricEvidence found;
+  found.has_converged = true;
+  found.evidence = {.inlier_ratio = 0.68,
+                    .free_space_agreement = 0.96,
+                    .intensity_agreement = 0.9,
+                    .rmse_m = 0.12,
+                    .overlap = 0.75,
+                    .distance_m = 0.5};
+  const double own = loop_log_odds(found.evidence);
+  ASSERT_GT(own, -1.5);
+  ASSERT_LT(own, 2.5) << "neither sure nor refuted";
+  judge(found, 0.0, {});
+  EXPECT_FALSE(found.consistent);
+  EXPECT_NE(found.reason.find("probability"), std::string::npos) << found.reason;
+  judge(found, 4.5, {});
+  EXPECT_TRUE(found.consistent) << found.reason;
+  EXPECT_NEAR(found.log_odds, own + 4.5, 1e-9);
+  found.has_converged = false;
+  judge(found, 4.5, {});
+  EXPECT_FALSE(found.consistent);
+  found.has_converged = true;
+  found.evidence.inlier_ratio = 0.3;
+  judge(found, 100.0, {});
+  EXPECT_FALSE(found.consistent) << "too few inliers, whatever else speaks for it";
+}
+
 }  // namespace
 }  // namespace revisit
