@@ -42,8 +42,7 @@ Status draw_trajectories(const std::filesystem::path& file, const Trajectory& re
       y = {std::min(y.min, p.y()), std::max(y.max, p.y())};
     }
   };
-  const Pose T_before = from_the_start(reference, before.trajectory),
-             T_after = from_the_start(reference, after.trajectory);
+  const Pose T_before = from_the_start(reference, before.trajectory), T_after = after.table.T_reference_estimate;
   cover(reference, Pose::Identity());
   cover(before.trajectory, T_before);
   const double margin_m = std::max({5.0, 0.05 * (x.max - x.min), 0.05 * (y.max - y.min)});
@@ -65,8 +64,10 @@ Status draw_trajectories(const std::filesystem::path& file, const Trajectory& re
                 15, Align::kCentre);
     left += kPanel;
   }
-  canvas.text({kPanel, kHeight - 25.0}, "green: where it was. Both trajectories are laid on the first pose of it.", 14,
-              Align::kCentre);
+  canvas.text(
+      {kPanel, kHeight - 25.0},
+      "green: where it was. Odometry is laid on its first pose, so that drift shows; the corrected one as a whole.", 14,
+      Align::kCentre);
   return canvas.save_png(file);
 }
 

@@ -16,7 +16,8 @@ struct JudgedTrajectory {
 };
 
 /// Side by side, without and with loop closing: the trajectory over the reference, and over the map where `tiles` holds
-/// one. Both start where the reference starts, so that drift shows.
+/// one. Odometry starts where the reference starts, so that drift shows; the corrected trajectory is aligned as a
+/// whole.
 Status draw_trajectories(const std::filesystem::path& file, const Trajectory& reference, const JudgedTrajectory& before,
                          const JudgedTrajectory& after, const std::filesystem::path& tiles);
 

@@ -53,11 +53,12 @@ double LoopDetector::Opinion::score() const {
   constexpr double kFlat = 6.0;
   const double registered = geometric ? 1.0 / (1.0 + std::exp(-geometric->log_odds / kFlat)) : 0.0;
   const double evidence = candidate.geometry_score / 4.0 + overlap / 4.0 + registered;
-  if (!geometric || !reason.empty()) return evidence;
+  if (!geometric) return evidence;
   // A loop over more than this is a right constraint, but not the same place (docs/evaluation.md).
   // Poses have errors: close to the limit it is open which of the two it is.
-  constexpr double kSamePlace_m = 4.0, kOpen_m = 0.5;
-  return evidence + 1.0 + std::clamp((kSamePlace_m - distance_m()) / kOpen_m, 0.0, 1.0);
+  constexpr double kSamePlace_m = 4.0, kOpen_m = 0.5, kRefused = 0.2;
+  const double same_place = std::clamp((kSamePlace_m - distance_m()) / kOpen_m, 0.0, 1.0);
+  return reason.empty() ? evidence + 1.0 + same_place : evidence + kRefused * same_place;
 }
 
 Status LoopDetector::add(Scan scan, const std::optional<Pose>& T_world_lidar) {
