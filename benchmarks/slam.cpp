@@ -29,8 +29,7 @@ const std::vector<Scan>& scans() {
 }
 
 void count(benchmark::State& state, std::size_t done) {
-  state.counters["scans_a_second"] =
-      benchmark::Counter(static_cast<double>(done), benchmark::Counter::kIsRate);
+  state.counters["scans_a_second"] = benchmark::Counter(static_cast<double>(done), benchmark::Counter::kIsRate);
 }
 
 void odometry_alone(benchmark::State& state) {
@@ -59,7 +58,8 @@ void everything(benchmark::State& state) {
   for (auto _ : state) {
     for (const char* ending : {"", "-wal", "-shm"}) std::filesystem::remove(file.string() + ending);
     auto store = MapStore::create(file);
-    auto slam = Slam::start({}, scale, {}, std::make_shared<MapStore>(*std::move(store)), Slam::OdometrySource::kLidar, {});
+    auto slam =
+        Slam::start({}, scale, {}, std::make_shared<MapStore>(*std::move(store)), Slam::OdometrySource::kLidar, {});
     for (const Scan& scan : all) {
       if (!slam->process(scan)) return state.SkipWithError("a scan was refused");
       ++done;

@@ -97,12 +97,14 @@ OdometryStep Odometry::find(double stamp_s, const OdometryScan& scan, const std:
   };
   const auto fits = [&](const IcpResult& icp) { return icp.converged && is_believed(icp.matched, icp.met); };
   IcpResult icp = align(search_radius_m(), T_moved);
-  // A turn or a jolt that was not foreseen, or the end of one.
-  for (const Pose& T_guess : {T_moved, Pose::Identity()}) {
-    if (fits(icp)) break;
-    const IcpResult other = align(kFarSearch_m, T_guess);
-    if (fits(other) || other.matched > icp.matched) icp = other;
-  }
+  // A turn or a jolt that was not foreseen, or the end of one. After a gap anything may fit somehow: nothing is tried.
+  const bool follows = gap_s > 0.0 && gap_s <= kLongestGap_s;
+  for (const double turn_deg : {0.0, 5.0, -5.0, 10.0, -10.0})
+    for (const Pose& T_guess : {T_moved, Pose(Pose::Identity())}) {
+      if (fits(icp) || (turn_deg != 0.0 && !follows)) break;
+      const IcpResult other = align(kFarSearch_m, T_guess * planar_pose(0.0, 0.0, to_radians(turn_deg)));
+      if (fits(other) || other.matched > icp.matched) icp = other;
+    }
   step.matched = icp.matched;
   step.met = icp.met;
   step.is_tracked = fits(icp);
@@ -128,8 +130,10 @@ void Odometry::accept(double stamp_s, const OdometryScan& scan, const OdometrySt
     map_.emplace(scan.voxel_m, kReach_m);
   } else {
     const double share = std::max(kForget, 1.0 / scans_);
-    if (step.is_tracked) squared_surprise_m2_ += share * (step.surprise_m * step.surprise_m - squared_surprise_m2_);
-    usual_match_ += share * (step.matched - usual_match_);
+    if (step.is_tracked) {
+      squared_surprise_m2_ += share * (step.surprise_m * step.surprise_m - squared_surprise_m2_);
+      usual_match_ += share * (step.matched - usual_match_);
+    }
     motion_.reset();
     if (gap_s > 0.0 && gap_s <= kLongestGap_s) motion_ = twist_of(step.T_before_now, gap_s);
   }
