@@ -67,7 +67,7 @@ INSTANTIATE_TEST_SUITE_P(Methods, EachBaseline, testing::Range(std::size_t{0}, m
                          });
 
 TEST(ScanContextBaseline, TurnedByWholeSectorsItIsTheSame) {
-  const auto method = std::move(make_baselines()[2]);
+  const auto method = std::move(make_baselines()[3]);
   ASSERT_EQ(method->name(), "scan-context");
   const auto place = method->describe(made_place(3), -1.7);
   EXPECT_NEAR(method->similarity(place, place), 1.0, 1e-5);
@@ -77,7 +77,7 @@ TEST(ScanContextBaseline, TurnedByWholeSectorsItIsTheSame) {
 }
 
 TEST(PublishedIscBaseline, OccupiedCellsNeverAgree) {
-  const auto method = std::move(make_baselines()[0]);
+  const auto method = std::move(make_baselines()[1]);
   ASSERT_EQ(method->name(), "isc-program");
   // All cells occupied, alike in both: geometry sees no cell that agrees, intensity no difference.
   const Baseline::Signature full = Baseline::Signature::Constant(20, 60, 100.f);

@@ -6,6 +6,7 @@ namespace revisit {
 std::vector<std::unique_ptr<Baseline>> make_baselines() {
   using namespace descriptors_internal;
   std::vector<std::unique_ptr<Baseline>> all;
+  all.push_back(make_paper_isc());
   all.push_back(make_published_isc());
   all.push_back(make_scan_context(10));
   all.push_back(make_scan_context(0));

@@ -5,6 +5,7 @@
 
 namespace revisit::descriptors_internal {
 
+std::unique_ptr<Baseline> make_paper_isc();
 std::unique_ptr<Baseline> make_published_isc();
 std::unique_ptr<Baseline> make_scan_context(std::size_t nearest_ring_keys);  ///< 0: every place is compared
 std::unique_ptr<Baseline> make_m2dp();
