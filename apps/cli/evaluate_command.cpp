@@ -101,8 +101,18 @@ Result<Trajectory> frames_asked(const fs::path& folder, const Trajectory& refere
 Result<JudgedTrajectory> judge(const fs::path& file, const Trajectory& reference) {
   const auto poses = read_poses(file);
   if (!poses) return poses.error();
+  // By the times that the poses were written with, where the map tells them.
   Stamps stamps;
-  for (const auto& [frame, entry] : reference.entries) stamps.emplace_back(frame, entry.stamp_s);
+  std::error_code failure;
+  if (const fs::path map = file.parent_path() / kMapStore; fs::exists(map, failure)) {
+    const auto store = MapStore::open(map);
+    if (!store) return store.error();
+    const auto scans = store->scans();
+    if (!scans) return scans.error();
+    for (const StoredScan& scan : *scans) stamps.emplace_back(scan.frame, scan.stamp_s);
+  } else {
+    for (const auto& [frame, entry] : reference.entries) stamps.emplace_back(frame, entry.stamp_s);
+  }
   JudgedTrajectory judged;
   judged.trajectory = to_trajectory(*poses, std::nullopt, stamps);
   judged.table = evaluate_trajectory(judged.trajectory, reference);

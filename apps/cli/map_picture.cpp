@@ -43,8 +43,8 @@ class Overview {
     for (std::size_t i = 0; i < counts_.size(); ++i) {
       if (counts_[i] == 0) continue;
       const double grey = 0.9 - 0.8 * std::min(1.0, static_cast<double>(counts_[i]) / *high);
-      canvas.fill({chart_.box().x + static_cast<double>(i % width_), chart_.box().y + static_cast<double>(i / width_),
-                   1.0, 1.0},
+      const std::size_t row = i / width_, column = i % width_;
+      canvas.fill({chart_.box().x + static_cast<double>(column), chart_.box().y + static_cast<double>(row), 1.0, 1.0},
                   {grey, grey, grey});
     }
   }
@@ -85,6 +85,7 @@ Status draw_map(const std::filesystem::path& file, const std::filesystem::path& 
   canvas.clip(chart.box());
   if (const Status status = draw_overview(canvas, chart, tiles, Pose::Identity()); !status) return status;
   std::vector<Pixel> line;
+  line.reserve(T_world_keyframes.size());
   for (const Pose& T : T_world_keyframes) line.push_back(chart.at(T.translation().x(), T.translation().y()));
   canvas.line(line, {0.85, 0.2, 0.1, 0.9}, 1.5);
   canvas.unclip();

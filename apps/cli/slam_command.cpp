@@ -53,6 +53,17 @@ Status check_note(MapStore& store, const std::string& name, const std::string& v
   return Error{std::string(kMapStore) + ": was made with " + what + " '" + **noted + "', not '" + value + "'"};
 }
 
+// What a map must be gone on with as it was begun.
+std::string parameters_text(const Parameters& parameters, const Options& options) {
+  std::string text =
+      "odometry=" + options.odometry + " wheels=" + options.wheels + " calibration=" + options.calibration;
+  for (const ParameterInfo& info : parameter_infos())
+    if (info.name.starts_with("preprocess.") || info.name.starts_with("intensity.") ||
+        info.name.starts_with("descriptor.") || info.name == "geometric.voxel_m")
+      text += " " + info.name + "=" + get_parameter(parameters, info.name);
+  return text;
+}
+
 Result<std::shared_ptr<MapStore>> open_store(const Options& options) {
   const fs::path file = fs::path(options.out) / kMapStore;
   std::error_code failure;
@@ -90,6 +101,7 @@ Status run_all(Slam& slam, const Recording& recording, const Trajectory& odometr
     while (first < recording.size() && recording.frame(first) <= *last) ++first;
     print_log()(LogLevel::kInfo, "going on after frame " + std::to_string(last->value) + ": " +
                                      std::to_string(slam.keyframes().size()) + " key frames are there");
+    if (const auto T_odom_lidar = odometry.at(*last)) slam.recall_odometry(*T_odom_lidar);
   }
   Progress progress("slam", "scans", recording.size() - first);
   ReadAhead scans(recording, first);
@@ -109,7 +121,8 @@ Status run_all(Slam& slam, const Recording& recording, const Trajectory& odometr
     progress.update(i + 1 - first);
   }
   run.interrupted = interrupted();
-  return slam.finish();
+  // Loops that wait for others may still get them, when the run goes on.
+  return slam.finish(!run.interrupted);
 }
 
 Status write_rows(const MapStore& store, ResultWriter& writer) {
@@ -191,6 +204,9 @@ int slam(const Options& options) {
   const auto store = open_store(options);
   if (!store) return fail(store.error());
   if (const Status status = check_note(**store, "input", run.input, "the recording"); !status)
+    return fail(status.error());
+  if (const Status status = check_note(**store, "parameters", parameters_text(*parameters, options), "the parameters");
+      !status)
     return fail(status.error());
   const auto source = options.odometry.empty() ? Slam::OdometrySource::kLidar : Slam::OdometrySource::kExternal;
   auto slam = Slam::start(*parameters, *scale, *calibration, *store, source, print_log());

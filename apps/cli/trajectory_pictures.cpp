@@ -23,6 +23,7 @@ Pose from_the_start(const Trajectory& reference, const Trajectory& estimate) {
 void draw_line(Canvas& canvas, const Chart& chart, const Trajectory& trajectory, const Pose& T_reference_estimate,
                const Colour& colour, double width) {
   std::vector<Pixel> line;
+  line.reserve(trajectory.entries.size());
   for (const auto& [frame, entry] : trajectory.entries) {
     const Eigen::Vector3d p = T_reference_estimate * entry.T_world_lidar.translation();
     line.push_back(chart.at(p.x(), p.y()));

@@ -24,25 +24,24 @@ Status TileFiles::append(const TileIndex& tile, std::vector<Point>& points) {
                static_cast<std::streamsize>(points.size() * sizeof(Point)));
   stream.close();
   if (!stream) return Error{file(tile).string() + ": cannot be written: " + std::strerror(errno)};
-  points.clear();
+  points = {};  // with its capacity
   return ok();
 }
 
 Status TileFiles::add(const std::vector<Point>& points) {
-  constexpr std::size_t kMostWaiting = 50'000;
+  constexpr std::size_t kMostWaiting = 2'000'000;  // of all tiles
   for (const Point& p : points) {
     const TileIndex tile{static_cast<int>(std::floor(p.x / tile_m_)), static_cast<int>(std::floor(p.y / tile_m_))};
-    auto& waiting = waiting_[tile];
-    waiting.push_back(p);
-    if (waiting.size() >= kMostWaiting)
-      if (const Status status = append(tile, waiting); !status) return status;
+    waiting_[tile].push_back(p);
   }
-  return ok();
+  points_waiting_ += points.size();
+  return points_waiting_ < kMostWaiting ? ok() : flush();
 }
 
 Status TileFiles::flush() {
   for (auto& [tile, points] : waiting_)
     if (const Status status = append(tile, points); !status) return status;
+  points_waiting_ = 0;
   return ok();
 }
 

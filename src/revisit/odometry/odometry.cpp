@@ -16,6 +16,7 @@ constexpr double kReach_m = 100.0;                          // of the map
 constexpr double kForget = 0.1;                             // share of the newest in a running mean
 constexpr double kFarSearch_m = 2.0;                        // where little is known of the motion
 constexpr double kFewestMatched = 0.3, kUsualSpread = 0.2;  // of a scan's points
+constexpr double kLeastSeen = 1e-3;                         // a point in a thousand that faces a direction
 constexpr double kLongestGuess_s = 5.0;
 constexpr double kLongestGap_s = 1.0;  // beyond, the motion before says nothing about the motion now
 
@@ -74,23 +75,24 @@ bool Odometry::is_believed(double matched, double met) const {
 OdometryStep Odometry::find(double stamp_s, const OdometryScan& scan, const std::optional<Pose>& T_before_now) const {
   OdometryStep step;
   step.T_odom_lidar = T_odom_lidar_;
-  if (!map_) {
-    if (T_before_now) step.T_before_now = *T_before_now;
-    step.T_odom_lidar = T_odom_lidar_ * step.T_before_now;
-    step.is_tracked = true;  // wherever it is: there the map begins
-    return step;
-  }
-  const double voxel_m = map_->voxel_m();
   // Over a gap the motion before is a poor guess, and still a better one than none.
   const double gap_s = stamp_s - last_stamp_s_;
   const bool goes_on = motion_ && gap_s > 0.0 && gap_s <= kLongestGuess_s;
   const Pose T_moved = T_before_now ? *T_before_now : goes_on ? motion_after(*motion_, gap_s) : Pose::Identity();
+  if (!map_) {
+    step.T_before_now = step.T_before_found = T_moved;
+    step.T_odom_lidar = T_odom_lidar_ * T_moved;
+    step.is_tracked = true;  // wherever it is: there the map begins
+    return step;
+  }
+  const double voxel_m = map_->voxel_m();
   const auto align = [&](double radius_m, const Pose& T_guess) {
     IcpResult icp = align_icp(*map_, scan.points, T_odom_lidar_ * T_guess,
                               {.coarse_m = radius_m,
                                .fine_m = std::min(radius_m, 0.3 * voxel_m + 0.1),
                                .least_reach_m = voxel_m,
-                               .settled_m = 2e-3});
+                               .settled_m = 2e-3,
+                               .least_seen = kLeastSeen});
     constexpr double kSteady_m = 0.02;  // rocking between two voxels
     icp.converged = icp.converged || (icp.information(0, 0) > 0.0 && icp.last_step_m < kSteady_m);
     return icp;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/odometry/odometry.hpp>
 
+#include <random>
+
 #include <gtest/gtest.h>
 
 #include "synthetic_world.hpp"
@@ -62,6 +64,33 @@ TEST(Odometry, SaysWhenItIsLostAndKeepsWhatWheelsSay) {
     EXPECT_FALSE(step.is_tracked) << step.matched << " of " << usual;
     EXPECT_TRUE(step.T_before_now.isApprox(T_wheels));
   }
+}
+
+// A bare corridor without an end: every scan looks like the one before, wherever the robot is.
+std::vector<Point> corridor(unsigned noise) {
+  std::mt19937 random(noise);
+  std::normal_distribution<float> off(0.f, 0.01f);
+  std::vector<Point> points;
+  for (float x = -30.f; x < 30.f; x += 0.1f) {
+    for (float z = -1.f; z < 2.f; z += 0.2f)
+      for (const float y : {-2.f, 2.f}) points.push_back({x, y + off(random), z, 0.f});
+    for (float y = -2.f; y < 2.f; y += 0.2f) points.push_back({x, y, -1.f + off(random), 0.f});
+  }
+  return points;
+}
+
+TEST(Odometry, WhereScansSayNothingWheelsDo) {
+  Odometry odometry;
+  const Pose T_wheels = planar_pose(0.5, 0.0, 0.0);
+  Pose T_found = Pose::Identity();
+  for (int i = 0; i < 40; ++i) {
+    const OdometryStep step = odometry.track(0.1 * i, corridor(static_cast<unsigned>(i)),
+                                             i == 0 ? std::nullopt : std::optional<Pose>(T_wheels));
+    EXPECT_TRUE(step.is_tracked);
+    T_found = step.T_odom_lidar;
+  }
+  EXPECT_NEAR(T_found.translation().x(), 19.5, 0.4) << "2 % of the way";
+  EXPECT_LT(std::abs(T_found.translation().y()), 0.1);
 }
 
 TEST(Odometry, AStandingStartAndTimesThatStandStill) {

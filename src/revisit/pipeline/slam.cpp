@@ -43,7 +43,7 @@ Result<SlamStep> Slam::process(Scan scan, const std::optional<Pose>& T_odom_lida
                  " and " + std::to_string(parameters_.preprocess.max_range_m) + " m"};
   Stopwatch watch;
   const double stamp_s = monotone_stamp(scan);
-  const bool starts_anew = anew_;
+  const bool starts_anew = anew_ && !keyframes_.empty();
   Scan swept = scan;
   std::optional<Twist> motion;
   const OdometryStep odometry = track(swept, stamp_s, prior(T_odom_lidar), motion);
@@ -51,8 +51,8 @@ Result<SlamStep> Slam::process(Scan scan, const std::optional<Pose>& T_odom_lida
 
   last_frame_ = scan.frame;
   last_stamp_s_ = stamp_s;
-  if (T_odom_lidar) T_prior_last_ = T_odom_lidar;
   T_odom_last_ = odometry.T_odom_lidar;
+  if (T_odom_lidar) recall_odometry(*T_odom_lidar);
   step.is_tracked = odometry.is_tracked;
 
   // Until it is known how well intensities agree with this sensor, every scan is looked at for that.
@@ -80,6 +80,11 @@ Result<SlamStep> Slam::process(Scan scan, const std::optional<Pose>& T_odom_lida
   return step;
 }
 
+void Slam::recall_odometry(const Pose& T_odom_lidar) {
+  T_prior_last_ = T_odom_lidar;
+  T_odom_at_prior_ = T_odom_last_;
+}
+
 double Slam::monotone_stamp(const Scan& scan) {
   constexpr double kUsualPeriod_s = 0.1;
   if (!last_frame_ || scan.stamp_s > last_stamp_s_) return scan.stamp_s;
@@ -91,7 +96,8 @@ double Slam::monotone_stamp(const Scan& scan) {
 
 std::optional<Pose> Slam::prior(const std::optional<Pose>& T_odom_lidar) const {
   if (!T_odom_lidar || !T_prior_last_) return std::nullopt;
-  return T_prior_last_->inverse() * *T_odom_lidar;
+  // Since the scan before, which may have come without: from the last one that had it.
+  return T_odom_last_.inverse() * T_odom_at_prior_ * (T_prior_last_->inverse() * *T_odom_lidar);
 }
 
 OdometryStep Slam::track(Scan& scan, double stamp_s, const std::optional<Pose>& T_before_now,
@@ -135,8 +141,8 @@ OdometryStep Slam::track(Scan& scan, double stamp_s, const std::optional<Pose>& 
   if (!odometry_.map() && !motion) first_scan_ = scan;
   odometry_.accept(stamp_s, thinned, step);
   untracked_ = step.is_tracked ? 0 : untracked_ + 1;
-  anew_ = untracked_ >= kLostAfter_scans;
-  if (anew_) {
+  if (untracked_ >= kLostAfter_scans) {
+    anew_ = true;
     log_to(log_, LogLevel::kWarning,
            frame_text(scan.frame) + ": tracking is lost since " + std::to_string(untracked_) +
                " scans; a new piece of trajectory begins, until its place in the map is found");
@@ -179,34 +185,29 @@ bool Slam::is_keyframe(const OdometryStep& step, const Scan& swept) const {
 
 Status Slam::add_keyframe(PreparedScan prepared, const OdometryStep& odometry, bool starts_anew, SlamStep& step) {
   Stopwatch watch;
-  step.is_keyframe = true;
-  step.starts_anew = starts_anew;
   if (starts_anew) {
     is_attached_ = false;
     before_piece_ = {keyframes_.back(), last_stamp_s_};
   }
-  StoredKeyframe keyframe{prepared.scan.frame, prepared.scan.stamp_s, odometry.T_odom_lidar, starts_anew, {}, {}, {}};
-  std::optional<StoredEdge> edge;
-  if (!keyframes_.empty()) edge = edge_from_last(keyframe, odometry.information);
-  add_to_graph(keyframe, edge);
-  seen_from_keyframe_ = prepared.cloud.seen;
-
+  // What cannot be read back from the store is no loop; the key frame is one all the same.
   auto detection = detector_.detect(prepared, std::nullopt, {false, is_attached_ ? std::nullopt : before_piece_});
-  if (!detection) return detection.error();
+  if (!detection)
+    log_to(log_, LogLevel::kWarning, frame_text(step.frame) + ": no loop is looked for: " + detection.error().message);
   step.ms.detect = watch.lap_ms();
+
+  StoredKeyframe keyframe{prepared.scan.frame, prepared.scan.stamp_s, odometry.T_odom_lidar, starts_anew, {}, {}, {}};
+  gate_.add_keyframe(keyframe.frame, keyframe.T_odom_lidar, starts_anew);
+  std::vector<LoopGate::Decision> decisions;
   bool is_known_place = false;
-  if (detection->loop) {
-    const auto decisions = gate_.offer({*detection->loop, detection->score});
-    if (const Status status = enter(decisions, &step); !status) return status;
+  if (detection && detection->loop) {
+    decisions = gate_.offer({*detection->loop, detection->score});
     // A place that is known is not learnt again: memory stays as it is on known ground.
     constexpr double kSamePlace_m = 1.0, kSameHeading_rad = 0.35;
     const Pose& T = detection->loop->T_match_query;
     is_known_place =
-        step.loops_entered > 0 && T.translation().norm() < kSamePlace_m && rotation_angle(T) < kSameHeading_rad;
+        !decisions.empty() && T.translation().norm() < kSamePlace_m && rotation_angle(T) < kSameHeading_rad;
   }
-  if (const Status status = enter(gate_.decide_waiting(false), &step); !status) return status;
-  if (const Status status = settle(false); !status) return status;
-  step.ms.graph = watch.lap_ms();
+  for (LoopGate::Decision& decision : gate_.decide_waiting(false)) decisions.push_back(std::move(decision));
 
   if (!is_known_place) {
     keyframe.descriptor = to_bytes(prepared.descriptor);
@@ -214,16 +215,33 @@ Status Slam::add_keyframe(PreparedScan prepared, const OdometryStep& odometry, b
     keyframe.cloud =
         to_map_bytes(thin_surfaces(prepared.scan.points, prepared.ground.is_ground, parameters_.slam.map_voxel_m));
   }
-  if (const Status status = store_->add(keyframe); !status) return status;
-  if (edge)
-    if (const Status status = store_->add(*edge); !status) return status;
-  if (detection->newest_searchable)
-    if (const Status status = store_->add(detection->row()); !status) return status;
+  std::optional<StoredEdge> edge;
+  if (!keyframes_.empty()) edge = edge_from_last(keyframe, odometry.information);
+  if (const Status status = store(keyframe, edge, detection ? &*detection : nullptr); !status) return status;
+  step.ms.store = watch.lap_ms();
+
+  // From here on memory and store say the same.
+  step.is_keyframe = true;
+  step.starts_anew = starts_anew;
+  if (starts_anew) anew_ = false;
+  add_to_graph(keyframe, edge);
+  seen_from_keyframe_ = prepared.cloud.seen;
   if (!is_known_place)
     if (const Status status = detector_.remember(std::move(prepared), std::nullopt); !status) return status;
-  step.detection = *std::move(detection);
-  step.ms.store = watch.lap_ms();
-  return ok();
+  if (detection) step.detection = *std::move(detection);
+  const Status entered = enter(decisions, &step);
+  if (const Status settled = settle(false); !settled) log_to(log_, LogLevel::kWarning, settled.error().message);
+  step.ms.graph = watch.lap_ms();
+  return entered;
+}
+
+// All of it or nothing.
+Status Slam::store(const StoredKeyframe& keyframe, const std::optional<StoredEdge>& edge, const Detection* detection) {
+  Status status = store_->add(keyframe);
+  if (status && edge) status = store_->add(*edge);
+  if (status && detection != nullptr && detection->newest_searchable) status = store_->add(detection->row());
+  if (!status) (void)store_->take_back();
+  return status;
 }
 
 StoredEdge Slam::edge_from_last(const StoredKeyframe& keyframe, const Matrix6& information) const {
@@ -241,12 +259,12 @@ void Slam::add_to_graph(const StoredKeyframe& keyframe, const std::optional<Stor
   if (from_last) graph_.add_edge({node - 1, node, from_last->T_from_to, from_last->information});
   node_of_[keyframe.frame] = node;
   keyframes_.push_back(keyframe.frame);
-  gate_.add_keyframe(keyframe.frame, keyframe.T_odom_lidar, keyframe.starts_anew);
   T_odom_keyframe_ = keyframe.T_odom_lidar;
   ++keyframes_unsettled_;
 }
 
 Status Slam::enter(const std::vector<LoopGate::Decision>& decisions, SlamStep* step) {
+  Status result = ok();
   for (const LoopGate::Decision& decision : decisions) {
     const LoopConstraint& loop = decision.loop.constraint;
     if (!decision.enters) {
@@ -258,7 +276,7 @@ Status Slam::enter(const std::vector<LoopGate::Decision>& decisions, SlamStep* s
     StoredEdge edge{loop.match, loop.query, loop.T_match_query, loop_information(loop.information), decision.loop};
     edge.loop->constraint.information = edge.information;
     graph_.add_edge({node_of_.at(edge.from), node_of_.at(edge.to), edge.T_from_to, edge.information, true});
-    if (const Status status = store_->add(edge); !status) return status;
+    if (const Status status = store_->add(edge); !status && result) result = status;
     ++loops_unsettled_;
     if (step != nullptr) ++step->loops_entered;
     if (!is_attached_ && before_piece_ && before_piece_->first < loop.query) {
@@ -267,7 +285,7 @@ Status Slam::enter(const std::vector<LoopGate::Decision>& decisions, SlamStep* s
              frame_text(loop.query) + ": found again in the map, at frame " + std::to_string(loop.match.value));
     }
   }
-  return ok();
+  return result;
 }
 
 Status Slam::settle(bool is_end) {
@@ -279,11 +297,13 @@ Status Slam::settle(bool is_end) {
   return ok();
 }
 
-Status Slam::finish() {
+Status Slam::finish(bool is_end) {
   if (keyframes_.empty()) return ok();
-  if (const Status status = enter(gate_.decide_waiting(true), nullptr); !status) return status;
-  if (const Status status = settle(true); !status) return status;
-  return store_->commit();
+  const Status entered = is_end ? enter(gate_.decide_waiting(true), nullptr) : ok();
+  const Status settled = settle(true), committed = store_->commit();
+  for (const Status* each : {&entered, &settled})
+    if (!*each) return *each;
+  return committed;
 }
 
 Result<Slam::Trajectories> Slam::trajectories() const {

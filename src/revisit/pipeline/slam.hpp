@@ -48,8 +48,10 @@ class Slam {
   /// that do not increase are told and taken as a scan later by a tenth of a second. An error says why the scan cannot
   /// be used; the next one can.
   Result<SlamStep> process(Scan scan, const std::optional<Pose>& T_odom_lidar = std::nullopt);
-  /// Decides what waits and settles the graph. More scans may follow.
-  Status finish();
+  /// Settles the graph, and at the end decides about loops that wait for others. More scans may follow.
+  Status finish(bool is_end = true);
+  /// What wheels said at the last scan of the map that is gone on with.
+  void recall_odometry(const Pose& T_odom_lidar);
 
   std::optional<FrameId> last_frame() const { return last_frame_; }
   const PoseGraph& graph() const { return graph_; }
@@ -72,6 +74,7 @@ class Slam {
   void start_again_with(const Twist& motion);
   bool is_keyframe(const OdometryStep& step, const Scan& swept) const;
   Status add_keyframe(PreparedScan prepared, const OdometryStep& odometry, bool starts_anew, SlamStep& step);
+  Status store(const StoredKeyframe& keyframe, const std::optional<StoredEdge>& edge, const Detection* detection);
   void add_to_graph(const StoredKeyframe& keyframe, const std::optional<StoredEdge>& from_last);
   StoredEdge edge_from_last(const StoredKeyframe& keyframe, const Matrix6& information) const;
   Status enter(const std::vector<LoopGate::Decision>& decisions, SlamStep* step);
@@ -91,11 +94,12 @@ class Slam {
   std::optional<FrameId> last_frame_;
   double last_stamp_s_ = 0.0;
   std::optional<Pose> T_prior_last_;
+  Pose T_odom_at_prior_ = Pose::Identity();  ///< our own, where T_prior_last_ was
   Pose T_odom_last_ = Pose::Identity(), T_odom_keyframe_ = Pose::Identity();
   SeenSpace seen_from_keyframe_;
   std::optional<Scan> first_scan_;  ///< of a piece, as it was swept, until the second one is there
   int untracked_ = 0;               ///< scans in a row
-  bool anew_ = false;               ///< the next scan begins a new piece
+  bool anew_ = false;               ///< the next key frame begins a new piece
   bool is_attached_ = true;         ///< the piece hangs together with those before by a loop
   std::optional<std::pair<FrameId, double>> before_piece_;  ///< the last key frame before it
   std::size_t loops_unsettled_ = 0, keyframes_unsettled_ = 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 
 #include <revisit/pipeline/keyframe_bytes.hpp>
@@ -21,6 +22,12 @@ Status Slam::restore() {
     const auto edge = from_last.find(keyframe.frame);
     if (keyframes_.empty() != (edge == from_last.end()))
       return Error{"key frame " + std::to_string(keyframe.frame.value) + " of the map does not hang on the one before"};
+    if (!keyframes_.empty() && edge->second->from != keyframes_.back())
+      return Error{"key frame " + std::to_string(keyframe.frame.value) + " of the map hangs on key frame " +
+                   std::to_string(edge->second->from.value) + ", which is not the one before"};
+    if (!std::isfinite(keyframe.stamp_s) || (keyframes_.empty() && keyframe.starts_anew))
+      return Error{"key frame " + std::to_string(keyframe.frame.value) + " of the map is damaged"};
+    gate_.add_keyframe(keyframe.frame, keyframe.T_odom_lidar, keyframe.starts_anew);
     add_to_graph(keyframe, keyframes_.empty() ? std::nullopt : std::optional<StoredEdge>(*edge->second));
     if (keyframe.starts_anew) {
       is_attached_ = false;
@@ -31,11 +38,16 @@ Status Slam::restore() {
     if (descriptor->empty()) continue;
     const auto read = to_descriptor(*descriptor);
     if (!read) return Error{"the descriptor of key frame " + std::to_string(keyframe.frame.value) + " is damaged"};
+    if (read->rings != parameters_.descriptor.rings || read->sectors != parameters_.descriptor.sectors ||
+        read->levels != parameters_.descriptor.levels)
+      return Error{"the map describes places on a grid of " + std::to_string(read->rings) + " x " +
+                   std::to_string(read->sectors) + " x " + std::to_string(read->levels) +
+                   " cells, not on the one that is asked for: go on with the parameters it was begun with"};
     detector_.recall(keyframe.frame, keyframe.stamp_s, *read);
   }
   for (const StoredEdge& edge : *edges) {
     if (!edge.loop) continue;
-    if (!node_of_.contains(edge.from) || !node_of_.contains(edge.to))
+    if (edge.from == edge.to || !node_of_.contains(edge.from) || !node_of_.contains(edge.to))
       return Error{"a loop of the map names key frame " + std::to_string(edge.to.value) + ", which it does not have"};
     graph_.add_edge({node_of_[edge.from], node_of_[edge.to], edge.T_from_to, edge.information, true});
     gate_.restore(*edge.loop);
@@ -52,6 +64,7 @@ Status Slam::restore_odometry(const std::vector<StoredKeyframe>& keyframes) {
   if (!scans) return scans.error();
   if (scans->empty()) return Error{"the map has key frames but no scans"};
   const StoredScan& last = scans->back();
+  if (!std::isfinite(last.stamp_s)) return Error{"the last scan of the map has no time"};
   last_frame_ = last.frame;
   last_stamp_s_ = last.stamp_s;
   T_odom_last_ = last.T_odom_lidar;
@@ -70,12 +83,13 @@ Status Slam::restore_odometry(const std::vector<StoredKeyframe>& keyframes) {
     step.T_odom_lidar = it->T_odom_lidar;
     step.is_tracked = true;
     odometry_.accept(it->stamp_s, odometry_.thinned(*points), step);
-    seen_from_keyframe_ = SeenSpace(*points);
+    if (it + 1 == keyframes.end()) seen_from_keyframe_ = SeenSpace(*points);
   }
   std::optional<Twist> motion;
   if (scans->size() >= 2) {
     const StoredScan& before = (*scans)[scans->size() - 2];
-    motion = twist_of(before.T_odom_lidar.inverse() * last.T_odom_lidar, last.stamp_s - before.stamp_s);
+    if (const double gap_s = last.stamp_s - before.stamp_s; gap_s > 0.0 && std::isfinite(gap_s))
+      motion = twist_of(before.T_odom_lidar.inverse() * last.T_odom_lidar, gap_s);
   }
   odometry_.stand_at(last.stamp_s, last.T_odom_lidar, motion);
   return ok();

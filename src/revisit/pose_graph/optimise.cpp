@@ -85,7 +85,7 @@ Solved solve(std::vector<Block>& blocks, const std::vector<PoseEdge>& edges, int
   options.logging_type = ceres::SILENT;
   options.max_num_iterations = most_iterations;
   options.function_tolerance = settled;
-  options.num_threads = 2;
+  options.num_threads = 1;  // with more, sums and so poses would differ in their last bits from run to run
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
   return {summary.IsSolutionUsable(), summary.initial_cost, summary.final_cost,

@@ -9,6 +9,7 @@
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_reduce.h>
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
 namespace revisit {
 namespace {
@@ -100,6 +101,19 @@ Matrix6 information_of(const Equations& sum, const Pose& T) {
   return axes.transpose() * sum.H * axes / (kPointsThatCountAsOne * variance_m2);
 }
 
+// The step without its part along directions that next to nothing fixes (Zhang et al., "On degeneracy of
+// optimization-based state estimation problems", ICRA 2016).
+Vector6 seen_part(const Vector6& xi, const Equations& sum, double least_seen) {
+  constexpr double kArm_m = 10.0;
+  Vector6 scale;
+  scale << Eigen::Vector3d::Ones(), Eigen::Vector3d::Constant(kArm_m);
+  const Matrix6 per_point = scale.cwiseInverse().asDiagonal() * sum.H * scale.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Matrix6> axes(per_point / sum.weights);
+  const Vector6 along = axes.eigenvectors().transpose() * scale.cwiseProduct(xi);
+  const Vector6 seen = (axes.eigenvalues().array() < least_seen).select(Vector6::Zero(), along);
+  return scale.cwiseInverse().cwiseProduct(axes.eigenvectors() * seen);
+}
+
 // One Gauss-Newton step; false where the points do not fix the pose.
 bool step(const Surface& target, Points source, const IcpOptions& options, double width_m, IcpResult& result,
           double& moved) {
@@ -128,7 +142,8 @@ bool step(const Surface& target, Points source, const IcpOptions& options, doubl
   if (sum.pairs < kFewestPairs) return false;
   result.information = information_of(sum, T);
   sum.H.diagonal().array() += 1e-6 * sum.H.diagonal().maxCoeff();  // a direction that nothing sees stays where it was
-  const Vector6 xi = sum.H.ldlt().solve(-sum.g);
+  Vector6 xi = sum.H.ldlt().solve(-sum.g);
+  if (options.least_seen > 0.0) xi = seen_part(xi, sum, options.least_seen);
   if (!xi.allFinite()) return false;
   const Pose small = small_motion(xi);
   T.linear() = small.linear() * T.linear();

@@ -26,6 +26,9 @@ struct IcpOptions {
   double least_reach_m = 0.0;  ///< points look for a patch within the kernel's width, or this where it is larger
   double settled_m = 2e-4;     ///< converged where a step at the last width moves points 20 m away less than this
   int most_iterations = 60;
+  /// Directions in which the surfaces' normals have on average a smaller square share than this stay as guessed: along
+  /// a bare corridor normals are noise. Turns count as the way of a point 10 m away.
+  double least_seen = 0.0;
   /// Normals of the source, one a point: plane-to-plane (generalised ICP, Segal et al., RSS 2009, with the covariances
   /// of planes); empty: point-to-plane.
   std::span<const Eigen::Vector3f> source_normals = {};

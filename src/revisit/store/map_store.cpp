@@ -39,7 +39,9 @@ std::optional<Pose> to_pose(std::span<const std::byte> bytes) {
   if (bytes.size() != sizeof v) return std::nullopt;
   std::memcpy(v.data(), bytes.data(), sizeof v);
   const Eigen::Quaterniond q(v[6], v[3], v[4], v[5]);
-  if (!(std::abs(q.norm() - 1.0) < 1e-3) || !std::isfinite(v[0] + v[1] + v[2])) return std::nullopt;
+  constexpr double kFarthest_m = 1e7;
+  const auto is_near = [](double metres) { return std::abs(metres) < kFarthest_m; };
+  if (!(std::abs(q.norm() - 1.0) < 1e-3) || !is_near(v[0]) || !is_near(v[1]) || !is_near(v[2])) return std::nullopt;
   Pose T = Pose::Identity();
   T.linear() = q.normalized().toRotationMatrix();
   T.translation() << v[0], v[1], v[2];
@@ -50,7 +52,7 @@ std::optional<Matrix6> to_matrix(std::span<const std::byte> bytes) {
   Matrix6 matrix;
   if (bytes.size() != 36 * sizeof(double)) return std::nullopt;
   std::memcpy(matrix.data(), bytes.data(), bytes.size());
-  if (!matrix.allFinite()) return std::nullopt;
+  if (!matrix.allFinite() || !matrix.isApprox(matrix.transpose(), 1e-6)) return std::nullopt;
   return matrix;
 }
 
@@ -62,7 +64,6 @@ struct MapStore::Database {
   };
   std::string file;
   std::unique_ptr<sqlite3, Close> handle;
-  bool in_transaction = false;
 
   Statement prepare(const char* sql) const { return {handle.get(), file, sql}; }
   Status run(const char* sql) const { return prepare(sql).run(); }
@@ -70,11 +71,10 @@ struct MapStore::Database {
     return {file + ": row " + std::to_string(row) + " of its " + what + " is damaged"};
   }
   Status begin() {
-    if (in_transaction) return ok();
-    const Status begun = run("BEGIN");
-    in_transaction = static_cast<bool>(begun);
-    return begun;
+    // SQLite may end a transaction by itself (a full disk): it is asked, not remembered.
+    return is_in_transaction() ? ok() : run("BEGIN");
   }
+  bool is_in_transaction() const { return sqlite3_get_autocommit(handle.get()) == 0; }
   static Result<std::unique_ptr<Database>> connect(const std::filesystem::path& path, int flags) {
     auto database = std::make_unique<Database>();
     database->file = path.string();
@@ -184,12 +184,9 @@ Status MapStore::add(const CandidateRow& answer) {
   return statement.bind(answer.score).bind(std::int64_t{answer.accepted}).bind(answer.reason).run();
 }
 
-Status MapStore::commit() {
-  if (!database_->in_transaction) return ok();
-  const Status done = database_->run("COMMIT");
-  database_->in_transaction = !done;
-  return done;
-}
+Status MapStore::commit() { return database_->is_in_transaction() ? database_->run("COMMIT") : ok(); }
+
+Status MapStore::take_back() { return database_->is_in_transaction() ? database_->run("ROLLBACK") : ok(); }
 
 Status MapStore::set_note(const std::string& name, const std::string& text) {
   if (const Status begun = database_->begin(); !begun) return begun;

@@ -61,6 +61,8 @@ class MapStore {
   Status add(const CandidateRow& answer);
   /// Everything added since the last commit becomes part of the map, or none of it does.
   Status commit();
+  /// Everything added since the last commit is forgotten.
+  Status take_back();
 
   /// A note to remember: which recording, which parameters. A second one of the same name replaces the first.
   Status set_note(const std::string& name, const std::string& text);

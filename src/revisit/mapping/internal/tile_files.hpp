@@ -36,6 +36,7 @@ class TileFiles {
   std::filesystem::path folder_;
   double tile_m_;
   std::map<TileIndex, std::vector<Point>> waiting_;
+  std::size_t points_waiting_ = 0;
 };
 
 /// One point a voxel, the mean of its points, in the order of the voxels.
