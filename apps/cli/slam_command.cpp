@@ -8,6 +8,7 @@
 #include <revisit/mapping/build_map.hpp>
 #include <revisit/pipeline/keyframe_bytes.hpp>
 #include <revisit/pipeline/slam.hpp>
+#include <revisit/preprocess/undistort.hpp>
 
 #include "common.hpp"
 #include "map_picture.hpp"
@@ -22,6 +23,7 @@ namespace fs = std::filesystem;
 
 struct Options {
   std::string input, out, calibration, odometry, wheels;
+  double sweep_s = 0.0;
   bool overwrite = false, resume = false, without_map = false;
   ParameterFlags parameters;
 };
@@ -55,8 +57,8 @@ Status check_note(MapStore& store, const std::string& name, const std::string& v
 
 // What a map must be gone on with as it was begun.
 std::string parameters_text(const Parameters& parameters, const Options& options) {
-  std::string text =
-      "odometry=" + options.odometry + " wheels=" + options.wheels + " calibration=" + options.calibration;
+  std::string text = "odometry=" + options.odometry + " wheels=" + options.wheels +
+                     " calibration=" + options.calibration + " sweep=" + std::to_string(options.sweep_s);
   for (const ParameterInfo& info : parameter_infos())
     if (info.name.starts_with("preprocess.") || info.name.starts_with("intensity.") ||
         info.name.starts_with("descriptor.") || info.name == "geometric.voxel_m")
@@ -95,7 +97,7 @@ void count(RunFile& run, const SlamStep& step) {
     run.ms_total[stage] += value;
 }
 
-Status run_all(Slam& slam, const Recording& recording, const Trajectory& odometry, RunFile& run) {
+Status run_all(Slam& slam, const Recording& recording, const Trajectory& odometry, double sweep_s, RunFile& run) {
   std::size_t first = 0;
   if (const auto last = slam.last_frame()) {
     while (first < recording.size() && recording.frame(first) <= *last) ++first;
@@ -109,6 +111,7 @@ Status run_all(Slam& slam, const Recording& recording, const Trajectory& odometr
     Stopwatch watch;
     auto scan = scans.next();
     run.ms_total["read"] += watch.lap_ms();
+    if (scan) assume_sweep(*scan, sweep_s);
     const auto step =
         scan ? slam.process(*std::move(scan), odometry.at(recording.frame(i))) : Result<SlamStep>(scan.error());
     if (step) {
@@ -217,7 +220,7 @@ int slam(const Options& options) {
   if (!writer) return fail(writer.error());
   listen_for_interrupt();
   Stopwatch watch;
-  Status status = run_all(*slam, **recording, *odometry, run);
+  Status status = run_all(*slam, **recording, *odometry, options.sweep_s, run);
   run.ms_total["all"] = watch.lap_ms();
   run.counts["skipped"] = run.skipped.size();
   // What was found until here is written, whatever happened.
@@ -267,6 +270,12 @@ Run add_slam(CLI::App& program) {
       "(default: the recording's wheel_odometry.tum, if any; none: without)");
   command->add_option("--odometry", options->odometry,
                       "Pose file of another odometry, taken instead of tracking the scans (wheels: the recording's)");
+  command
+      ->add_option(
+          "--sweep", options->sweep_s,
+          "For points without times whose distortion nobody has undone (KITTI raw): the sensor turns once in so "
+          "many seconds, clockwise from above, and looks ahead at the stamp; negative: the other way round")
+      ->check(CLI::Range(-1.0, 1.0));
   command->add_option("--calibration", options->calibration, "Intensity calibration made by `revisit calibrate`");
   command->add_flag("--resume", options->resume, "Go on with the map that is in the folder");
   command->add_flag("--overwrite", options->overwrite, "Replace the map that is in the folder");

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include <revisit/core/pose.hpp>
+
 namespace revisit {
 
 void undistort(Scan& scan, const Twist& motion) {
@@ -28,6 +30,13 @@ void undistort(Scan& scan, const Twist& motion) {
     p.y = q.y();
     p.z = q.z();
   }
+}
+
+void assume_sweep(Scan& scan, double sweep_s) {
+  if (!scan.times_s.empty() || sweep_s == 0.0) return;
+  const auto per_rad_s = static_cast<float>(-sweep_s / (2.0 * kPi));
+  scan.times_s.reserve(scan.points.size());
+  for (const Point& p : scan.points) scan.times_s.push_back(per_rad_s * std::atan2(p.y, p.x));
 }
 
 }  // namespace revisit

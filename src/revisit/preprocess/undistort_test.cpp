@@ -42,5 +42,25 @@ TEST(Undistort, PutsPointsWhereTheyAreSeenFromTheStamp) {
   }
 }
 
+TEST(AssumeSweep, AClockwiseSensorLooksLeftBeforeItLooksAhead) {
+  Scan scan;
+  scan.points = {{10, 0, 0, 0}, {0, 10, 0, 0}, {0, -10, 0, 0}, {-10, -1e-3f, 0, 0}};
+  Scan other = scan;
+  assume_sweep(scan, 0.1);
+  ASSERT_EQ(scan.times_s.size(), 4u);
+  EXPECT_NEAR(scan.times_s[0], 0.f, 1e-6f);
+  EXPECT_NEAR(scan.times_s[1], -0.025f, 1e-6f);
+  EXPECT_NEAR(scan.times_s[2], 0.025f, 1e-6f);
+  EXPECT_NEAR(scan.times_s[3], 0.05f, 1e-4f);
+  assume_sweep(other, -0.1);
+  EXPECT_NEAR(other.times_s[1], 0.025f, 1e-6f);
+  assume_sweep(other, 0.1);
+  EXPECT_NEAR(other.times_s[1], 0.025f, 1e-6f) << "times that are there stay";
+  Scan none;
+  none.points = {{1, 2, 3, 0}};
+  assume_sweep(none, 0.0);
+  EXPECT_TRUE(none.times_s.empty());
+}
+
 }  // namespace
 }  // namespace revisit
