@@ -26,7 +26,7 @@ Pose on_the_way(int i) {
 
 Scan scan_at(int i) {
   static const SyntheticWorld world(61);
-  Scan scan = world.scan(on_the_way(i), {24, 450, -20.0, 6.0}, static_cast<unsigned>(i));
+  Scan scan = world.scan(on_the_way(i), {16, 360, -20.0, 6.0}, static_cast<unsigned>(i));
   scan.frame = FrameId{i};
   scan.stamp_s = 0.1 * i;
   return scan;
