@@ -89,6 +89,12 @@ Result<std::unique_ptr<Recording>> open_input(const std::string& input, const st
   return std::unique_ptr<Recording>(*std::move(recording));
 }
 
+Stamps stamps_of(const Recording& recording) {
+  Stamps stamps;
+  for (std::size_t i = 0; i < recording.size(); ++i) stamps.emplace_back(recording.frame(i), recording.stamp_s(i));
+  return stamps;
+}
+
 Result<IntensityCalibration> load_calibration(const std::string& file) {
   if (file.empty()) return IntensityCalibration{};
   return read_calibration(file);

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -61,6 +62,10 @@ class ParameterFlags {
 /// options then stand in `parameters`, if given.
 Result<std::unique_ptr<Recording>> open_input(const std::string& input, const std::string& poses_file = {},
                                               Parameters* parameters = nullptr);
+
+/// Frame and time of each scan, s.
+using Stamps = std::vector<std::pair<FrameId, double>>;
+Stamps stamps_of(const Recording& recording);
 
 /// The calibration in `file`, or the identity where no file was named.
 Result<IntensityCalibration> load_calibration(const std::string& file);

@@ -24,14 +24,6 @@ struct Options {
   std::optional<double> exclude_s;
 };
 
-using Stamps = std::vector<std::pair<FrameId, double>>;
-
-Stamps stamps_of(const Recording& recording) {
-  Stamps stamps;
-  for (std::size_t i = 0; i < recording.size(); ++i) stamps.emplace_back(recording.frame(i), recording.stamp_s(i));
-  return stamps;
-}
-
 // The calibration of a camera that KITTI poses belong to: as named, beside the poses, or the recording's own.
 Result<std::optional<Pose>> find_camera_calibration(const Options& options, const Recording* recording) {
   const fs::path beside = fs::path(options.reference).parent_path() / "calib.txt";

@@ -39,9 +39,7 @@ Result<Trajectory> other_odometry(const Options& options, const Recording& recor
   }
   const auto poses = read_poses(file);
   if (!poses) return poses.error();
-  std::vector<std::pair<FrameId, double>> stamps;
-  for (std::size_t i = 0; i < recording.size(); ++i) stamps.emplace_back(recording.frame(i), recording.stamp_s(i));
-  auto trajectory = to_trajectory(*poses, recording.T_camera_lidar(), stamps);
+  auto trajectory = to_trajectory(*poses, recording.T_camera_lidar(), stamps_of(recording));
   if (trajectory.empty()) return Error{file + ": no pose belongs to a frame of the recording"};
   return trajectory;
 }
@@ -124,8 +122,7 @@ Status run_all(Slam& slam, const Recording& recording, const Trajectory& odometr
     progress.update(i + 1 - first);
   }
   run.interrupted = interrupted();
-  // Loops that wait for others may still get them, when the run goes on.
-  return slam.finish(!run.interrupted);
+  return slam.finish();
 }
 
 Status write_rows(const MapStore& store, ResultWriter& writer) {
@@ -159,13 +156,7 @@ Status write_map(const Slam& slam, const MapStore& store, const Parameters& para
                  RunFile& run) {
   Stopwatch watch;
   Progress progress("map", "key frames", slam.keyframes().size());
-  const auto points = [&](std::size_t i) -> Result<std::vector<Point>> {
-    const auto bytes = store.part(slam.keyframes()[i], MapStore::Part::kCloud);
-    if (!bytes) return bytes.error();
-    auto read = to_map_points(*bytes);
-    if (!read) return Error{"the cloud of key frame " + std::to_string(slam.keyframes()[i].value) + " is damaged"};
-    return *std::move(read);
-  };
+  const auto points = [&](std::size_t i) { return read_map_points(store, slam.keyframes()[i]); };
   MapOptions options;
   options.voxel_m = parameters.slam.map_voxel_m;
   const auto report = build_map(slam.graph().nodes(), points, options, out, [&](std::size_t done) {

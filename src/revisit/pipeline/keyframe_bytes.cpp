@@ -148,4 +148,12 @@ std::optional<std::vector<Point>> to_map_points(std::span<const std::byte> bytes
   return points;
 }
 
+Result<std::vector<Point>> read_map_points(const MapStore& store, FrameId keyframe) {
+  const auto bytes = store.part(keyframe, MapStore::Part::kCloud);
+  if (!bytes) return bytes.error();
+  auto points = to_map_points(*bytes);
+  if (!points) return store.damaged("cloud", keyframe);
+  return *std::move(points);
+}
+
 }  // namespace revisit

@@ -23,5 +23,7 @@ std::optional<ThinCloud> to_thin_cloud(std::span<const std::byte> bytes);
 /// A cloud for the map: positions to a centimetre (up to 327 m), intensity in 255 steps of [0, 1]; 7 bytes a point.
 Bytes to_map_bytes(const ThinCloud& cloud);
 std::optional<std::vector<Point>> to_map_points(std::span<const std::byte> bytes);
+/// Those of a key frame, in its frame, metres; none where the place was known already.
+Result<std::vector<Point>> read_map_points(const MapStore& store, FrameId keyframe);
 
 }  // namespace revisit

@@ -223,7 +223,7 @@ Status Slam::add_keyframe(PreparedScan prepared, const OdometryStep& odometry, b
   // From here on memory and store say the same.
   step.is_keyframe = true;
   step.starts_anew = starts_anew;
-  if (starts_anew) anew_ = false;
+  if (starts_anew || keyframes_.empty()) anew_ = false;  // before the first there is nothing to be lost from
   add_to_graph(keyframe, edge);
   seen_from_keyframe_ = prepared.cloud.seen;
   if (!is_known_place)
@@ -297,9 +297,9 @@ Status Slam::settle(bool is_end) {
   return ok();
 }
 
-Status Slam::finish(bool is_end) {
+Status Slam::finish() {
   if (keyframes_.empty()) return ok();
-  const Status entered = is_end ? enter(gate_.decide_waiting(true), nullptr) : ok();
+  const Status entered = enter(gate_.decide_waiting(true), nullptr);
   const Status settled = settle(true), committed = store_->commit();
   for (const Status* each : {&entered, &settled})
     if (!*each) return *each;

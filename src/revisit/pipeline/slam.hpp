@@ -48,8 +48,8 @@ class Slam {
   /// that do not increase are told and taken as a scan later by a tenth of a second. An error says why the scan cannot
   /// be used; the next one can.
   Result<SlamStep> process(Scan scan, const std::optional<Pose>& T_odom_lidar = std::nullopt);
-  /// Settles the graph, and at the end decides about loops that wait for others. More scans may follow.
-  Status finish(bool is_end = true);
+  /// Decides about loops that wait for others, and settles the graph. More scans may follow.
+  Status finish();
   /// What wheels said at the last scan of the map that is gone on with.
   void recall_odometry(const Pose& T_odom_lidar);
 

@@ -26,7 +26,7 @@ Status Slam::restore() {
       return Error{"key frame " + std::to_string(keyframe.frame.value) + " of the map hangs on key frame " +
                    std::to_string(edge->second->from.value) + ", which is not the one before"};
     if (!std::isfinite(keyframe.stamp_s) || (keyframes_.empty() && keyframe.starts_anew))
-      return Error{"key frame " + std::to_string(keyframe.frame.value) + " of the map is damaged"};
+      return store_->damaged("time or beginning", keyframe.frame);
     gate_.add_keyframe(keyframe.frame, keyframe.T_odom_lidar, keyframe.starts_anew);
     add_to_graph(keyframe, keyframes_.empty() ? std::nullopt : std::optional<StoredEdge>(*edge->second));
     if (keyframe.starts_anew) {
@@ -37,7 +37,7 @@ Status Slam::restore() {
     if (!descriptor) return descriptor.error();
     if (descriptor->empty()) continue;
     const auto read = to_descriptor(*descriptor);
-    if (!read) return Error{"the descriptor of key frame " + std::to_string(keyframe.frame.value) + " is damaged"};
+    if (!read) return store_->damaged("descriptor", keyframe.frame);
     if (read->rings != parameters_.descriptor.rings || read->sectors != parameters_.descriptor.sectors ||
         read->levels != parameters_.descriptor.levels)
       return Error{"the map describes places on a grid of " + std::to_string(read->rings) + " x " +
@@ -74,10 +74,8 @@ Status Slam::restore_odometry(const std::vector<StoredKeyframe>& keyframes) {
   for (auto it = first; it != keyframes.end(); ++it)
     if (it->starts_anew) first = it;
   for (auto it = first; it != keyframes.end(); ++it) {
-    const auto bytes = store_->part(it->frame, MapStore::Part::kCloud);
-    if (!bytes) return bytes.error();
-    const auto points = to_map_points(*bytes);
-    if (!points) return Error{"the cloud of key frame " + std::to_string(it->frame.value) + " is damaged"};
+    const auto points = read_map_points(*store_, it->frame);
+    if (!points) return points.error();
     if (points->empty()) continue;
     OdometryStep step;
     step.T_odom_lidar = it->T_odom_lidar;

@@ -27,7 +27,7 @@ class InStore final : public PlaceClouds {
     const auto bytes = store_->part(frame, MapStore::Part::kPlace);
     if (!bytes) return bytes.error();
     auto cloud = to_thin_cloud(*bytes);
-    if (!cloud) return Error{"the map's cloud of key frame " + std::to_string(frame.value) + " is damaged"};
+    if (!cloud) return store_->damaged("place", frame);
     return keep(frame, std::make_shared<const ThinCloud>(*std::move(cloud)));
   }
 

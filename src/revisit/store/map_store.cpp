@@ -276,4 +276,8 @@ Result<Bytes> MapStore::part(FrameId keyframe, Part part) const {
   return Error{database_->file + ": has no key frame " + std::to_string(keyframe.value)};
 }
 
+Error MapStore::damaged(const char* part, FrameId keyframe) const {
+  return {database_->file + ": the " + part + " of key frame " + std::to_string(keyframe.value) + " is damaged"};
+}
+
 }  // namespace revisit

@@ -77,6 +77,8 @@ class MapStore {
   enum class Part { kDescriptor, kPlace, kCloud };
   /// Empty where the place was known already. An unknown frame is an error.
   Result<Bytes> part(FrameId keyframe, Part part) const;
+  /// What to say of bytes that cannot be read: names the file, the part and the key frame.
+  Error damaged(const char* part, FrameId keyframe) const;
 
  private:
   struct Database;
