@@ -74,6 +74,10 @@ const std::vector<Entry>& table() {
                    "candidates of lower geometry plus intensity score are not registered"),
       REVISIT_SWITCH(geometric, overhead_search,
                      "find position and heading by laying the scans on each other from overhead before registering"),
+      REVISIT_SWITCH(
+          geometric, follow,
+          "look first where the last loops, and the motion since then, say that the robot is, and trust what "
+          "agrees with them"),
       REVISIT_REAL(geometric, min_overlap, 0, 1,
                    "least overlap from overhead, the smaller of both directions, that is worth registering"),
       REVISIT_SWITCH(geometric, features_first, "register from FPFH features before trying the yaw of the descriptors"),
@@ -205,6 +209,7 @@ Result<Parameters> preset(std::string_view name) {
     p.geometric.min_inlier_ratio = 0.6;
     p.geometric.min_probability = 0.0;
     p.geometric.overhead_search = false;
+    p.geometric.follow = false;
     p.geometric.features_first = true;
     return p;
   }

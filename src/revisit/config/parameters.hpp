@@ -59,6 +59,7 @@ struct GeometricOptions {
   int candidates = 3;                 ///< how many of the top-K are registered, best first
   double min_descriptor_score = 0.0;  ///< candidates with a lower Phi_g + Phi_i are not registered
   bool overhead_search = true;        ///< find position and heading from overhead before registering
+  bool follow = true;                 ///< look first where the last loops and the motion since lead, and trust it more
   double min_overlap = 0.4;           ///< of both images from overhead; candidates below are not registered
   bool features_first = false;        ///< start from FPFH, as the paper does, before trying the descriptors' yaw
   bool features_fallback = false;     ///< try FPFH where the descriptors' yaw gave no accepted registration; slow

@@ -13,28 +13,37 @@ std::optional<Twist> EgoMotion::expected(double stamp_s) const {
   return gap_s > 0.0 && gap_s <= kLongestGap_s ? motion_ : std::nullopt;
 }
 
-void EgoMotion::learn(double stamp_s, std::shared_ptr<const ScanGeometry> scan) {
+EgoMotion::Step EgoMotion::find(double stamp_s, std::shared_ptr<const ScanGeometry> scan) const {
+  Step step;
+  step.stamp_s = stamp_s;
+  step.scan = std::move(scan);
   const double gap_s = stamp_s - last_stamp_s_;
-  const bool follows = last_ && gap_s > 0.0 && gap_s <= kLongestGap_s;
-  std::optional<Twist> motion;
-  if (follows) {
-    // From a standstill the first time: a car goes 3 m in a tenth of a second.
-    const Pose T_guess = motion_ ? motion_after(*motion_, gap_s) : Pose::Identity();
-    const IcpResult icp =
-        align_icp(last_->surface(), scan->surface().points(), T_guess, {.coarse_m = motion_ ? 1.0 : 4.0});
-    constexpr double kInlier_m = 0.4, kFewestInliers = 0.4;
-    const Agreement agreement = measure_agreement(last_->surface(), scan->surface(), icp.T_target_source, kInlier_m);
-    if (icp.converged && agreement.inlier_ratio >= kFewestInliers) {
-      motion = twist_of(icp.T_target_source, gap_s);
-      // Of scans from the same spot, intensities would agree too well.
-      constexpr double kStill_m = 0.05;
-      if (agreement.intensity_correlation && icp.T_target_source.translation().norm() > kStill_m)
-        learn_intensities(*agreement.intensity_correlation);
-    }
-  }
-  motion_ = motion;
-  last_ = std::move(scan);
-  last_stamp_s_ = stamp_s;
+  if (!last_ || !(gap_s > 0.0 && gap_s <= kLongestGap_s)) return step;
+  // From a standstill the first time: a car goes 3 m in a tenth of a second.
+  const Pose T_guess = motion_ ? motion_after(*motion_, gap_s) : Pose::Identity();
+  const IcpResult icp =
+      align_icp(last_->surface(), step.scan->surface().points(), T_guess, {.coarse_m = motion_ ? 1.0 : 4.0});
+  constexpr double kInlier_m = 0.4, kFewestInliers = 0.4;
+  const Agreement agreement = measure_agreement(last_->surface(), step.scan->surface(), icp.T_target_source, kInlier_m);
+  if (!icp.converged || agreement.inlier_ratio < kFewestInliers) return step;
+  constexpr double kArm_m = 20.0;
+  const Pose off = T_guess.inverse() * icp.T_target_source;
+  step.surprise_m = off.translation().norm() + kArm_m * rotation_angle(off);
+  step.T_last_scan = icp.T_target_source;
+  step.motion = twist_of(icp.T_target_source, gap_s);
+  step.intensity_correlation = agreement.intensity_correlation;
+  return step;
+}
+
+void EgoMotion::learn(Step step) {
+  // Of scans from the same spot, intensities would agree too well.
+  constexpr double kStill_m = 0.05;
+  if (step.intensity_correlation && step.T_last_scan->translation().norm() > kStill_m)
+    learn_intensities(*step.intensity_correlation);
+  station_ = step.T_last_scan ? station_.after(*step.T_last_scan) : Station{.piece = station_.piece + 1};
+  motion_ = step.motion;
+  last_ = std::move(step.scan);
+  last_stamp_s_ = step.stamp_s;
 }
 
 void EgoMotion::learn_intensities(double correlation) {

@@ -9,11 +9,13 @@
 
 #include <oneapi/tbb/parallel_for.h>
 
+#include <revisit/descriptors/similarity.hpp>
+
 namespace revisit {
 namespace {
 
-constexpr int kOverheadReach_m = 6;    // a translation that retrieval may be off
-constexpr double kMostInFavour = 3.0;  // log odds that other answers may add to a candidate's
+constexpr int kOverheadReach_m = 6;  // a translation that retrieval may be off
+constexpr double kNear_m = 1.5;      // nearer, no better place is looked for
 
 }  // namespace
 
@@ -51,7 +53,7 @@ double LoopDetector::Opinion::score() const {
   // Registration knows best, then the view from overhead, then the descriptors. Flattened, so that no two sure ones
   // are equal.
   constexpr double kFlat = 6.0;
-  const double registered = geometric ? 1.0 / (1.0 + std::exp(-geometric->log_odds / kFlat)) : 0.0;
+  const double registered = geometric ? 1.0 / (1.0 + std::exp(-own_log_odds() / kFlat)) : 0.0;
   const double evidence = candidate.geometry_score / 4.0 + overlap / 4.0 + registered;
   if (!geometric) return evidence;
   // A loop over more than this is a right constraint, but not the same place (docs/evaluation.md).
@@ -74,18 +76,33 @@ Result<Detection> LoopDetector::localise(Scan scan) {
 }
 
 Result<PreparedScan> LoopDetector::prepare_next(Scan scan) {
-  // Without times nothing can be undone.
   const bool is_swept = !scan.times_s.empty();
-  const std::optional<Twist> motion = is_swept ? ego_motion_.expected(scan.stamp_s) : std::nullopt;
-  auto prepared = prepare(std::move(scan), motion);
-  if (prepared && (is_swept || !ego_motion_.knows_intensities())) learn_intensities(*prepared);
+  const Scan raw = is_swept ? scan : Scan{};
+  const std::optional<Twist> expected = ego_motion_.expected(scan.stamp_s);
+  auto prepared = prepare(std::move(scan), expected);
+  if (!prepared) return prepared;
+  EgoMotion::Step step = find_motion(*prepared);
+  // Points stand where the motion had them that was expected: where it was another, once more with that.
+  constexpr double kWrong_m = 0.2;
+  if (is_swept && step.motion && step.surprise_m > kWrong_m)
+    if (auto swept_so = prepare(raw, step.motion)) {
+      EgoMotion::Step so = find_motion(*swept_so);
+      if (so.motion) {
+        prepared = std::move(swept_so);
+        step = std::move(so);
+      }
+    }
+  ego_motion_.learn(std::move(step));
+  prepared->station = ego_motion_.station();
   return prepared;
 }
 
-void LoopDetector::learn_intensities(PreparedScan& prepared) {
+EgoMotion::Step LoopDetector::find_motion(PreparedScan& prepared) const {
   prepared.geometry = std::make_shared<ScanGeometry>(prepared.cloud);
-  ego_motion_.learn(prepared.scan.stamp_s, prepared.geometry);
+  return ego_motion_.find(prepared.scan.stamp_s, prepared.geometry);
 }
+
+void LoopDetector::learn_intensities(PreparedScan& prepared) { ego_motion_.learn(find_motion(prepared)); }
 
 Result<PreparedScan> LoopDetector::prepare(Scan scan, const std::optional<Twist>& motion) {
   if (!scale_) {
@@ -128,8 +145,8 @@ Result<Detection> LoopDetector::detect(const PreparedScan& prepared, const std::
   }
   if (!past.is_all)
     detection.newest_searchable = index_.newest_searchable(asked, asked_s);
-  else if (!T_world_places_.empty())
-    detection.newest_searchable = T_world_places_.rbegin()->first;
+  else if (!stations_.empty())
+    detection.newest_searchable = stations_.rbegin()->first;
   auto candidates =
       past.is_all ? index_.search_all(prepared.descriptor) : index_.search(asked, asked_s, prepared.descriptor);
   if (!candidates) return candidates.error();
@@ -149,7 +166,100 @@ Result<Detection> LoopDetector::detect(const PreparedScan& prepared, const std::
   return detection;
 }
 
+const ScanGeometry& LoopDetector::Query::geometry() {
+  if (!geometry_) geometry_ = std::make_shared<ScanGeometry>(scan.cloud);
+  return *geometry_;
+}
+
+void LoopDetector::register_it(Query& query, Opinion& opinion) const {
+  opinion.geometry = std::make_shared<ScanGeometry>(*opinion.place);
+  CandidateView view{opinion.T_guess_match_query, opinion.overlap};
+  if (const auto usual = ego_motion_.usual_intensity_correlation()) view.usual_intensity_correlation = *usual;
+  opinion.geometric = check_geometric(*opinion.geometry, query.geometry(), view, parameters_.geometric);
+  opinion.reason = opinion.geometric->reason;
+  weigh_in(opinion, track_.in_favour(query.scan.station, stations_.at(opinion.candidate.match),
+                                     opinion.geometric->T_match_query));
+}
+
 Status LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
+  Stopwatch watch;
+  Query query(prepared);
+  std::optional<Opinion> answer;
+
+  // Where the loops of the last metres say that the robot is. Sure and near: nobody else is asked.
+  std::optional<Opinion> expected;
+  if (parameters_.geometric.follow)
+    if (const auto where = track_.expected(prepared.station, stations_, *detection.newest_searchable);
+        where && where->T_match_query.translation().norm() <= kOverheadReach_m) {
+      auto registered = register_at(query, *where);
+      if (!registered) return registered.error();
+      expected = *std::move(registered);
+      if (expected->reason.empty() && is_sure(expected->own_log_odds()) && expected->distance_m() <= kNear_m)
+        answer = expected;
+    }
+  detection.geometric_ms += watch.lap_ms();
+
+  std::vector<Opinion> opinions;
+  if (!answer) {
+    auto asked = ask_candidates(query, detection);
+    if (!asked) return asked.error();
+    opinions = *std::move(asked);
+    detection.geometric_ms += watch.lap_ms();
+    const auto is_expected = [&](const Opinion& each) { return each.candidate.match == expected->candidate.match; };
+    if (expected && std::none_of(opinions.begin(), opinions.end(), is_expected)) opinions.push_back(*expected);
+    weigh_against_each_other(opinions);
+    const Opinion* best = nullptr;
+    for (const Opinion& each : opinions)
+      if (best == nullptr || each.score() > best->score()) best = &each;
+    if (best == nullptr) return ok();
+    answer = *best;
+  } else {
+    opinions.push_back(*answer);
+  }
+  for (const Opinion& each : opinions)
+    if (each.geometric) detection.registered.push_back({each.candidate.match, *each.geometric});
+
+  if (answer->reason.empty()) {
+    remember_loop(prepared.station, *answer);
+    if (const Status status = go_nearer(query, *detection.newest_searchable, *answer); !status) return status;
+    refine(*answer->geometric, *answer->geometry, query.geometry());
+  }
+  detection.geometric_ms += watch.lap_ms();
+
+  detection.answer = answer->candidate;
+  detection.temporal = std::move(answer->temporal);
+  detection.score = answer->score();
+  detection.reason = answer->reason;
+  detection.geometric = std::move(answer->geometric);
+  if (detection.reason.empty()) {
+    const GeometricEvidence& found = *detection.geometric;
+    detection.loop =
+        LoopConstraint{detection.frame,       detection.answer->match, found.T_match_query, found.evidence.inlier_ratio,
+                       found.evidence.rmse_m, found.probability,       found.information};
+  }
+  return ok();
+}
+
+Result<LoopDetector::Opinion> LoopDetector::register_at(Query& query, const LoopTrack::Expectation& where) {
+  LoopCandidate candidate;
+  if (const auto descriptor = index_.find(where.match))
+    candidate = match_descriptors(query.scan.descriptor, *descriptor);
+  candidate.match = where.match;
+  candidate.yaw_rad = yaw_of(where.T_match_query);
+  auto place = clouds_->get(where.match);
+  if (!place) return place.error();
+  Opinion opinion(candidate);
+  opinion.place = *std::move(place);
+  look_from_overhead(query.overhead, to_radians(3.0), opinion);
+  opinion.T_guess_match_query = where.T_match_query;
+  opinion.reason.clear();  // however little overlaps: something stands in the way, not elsewhere
+  check_temporal_and_scores(query.scan.scan.frame, opinion);
+  if (opinion.reason.empty()) register_it(query, opinion);
+  return opinion;
+}
+
+// The candidates of retrieval that look best from overhead, registered.
+Result<std::vector<LoopDetector::Opinion>> LoopDetector::ask_candidates(Query& query, Detection& detection) {
   std::vector<Opinion> opinions;
   for (const LoopCandidate& candidate : detection.candidates) {
     auto place = clouds_->get(candidate.match);
@@ -157,114 +267,87 @@ Status LoopDetector::verify(Detection& detection, const PreparedScan& prepared) 
     opinions.emplace_back(candidate).place = *std::move(place);
   }
   Stopwatch watch;
-  OverheadSearch overhead(prepared.cloud);
   if (parameters_.geometric.overhead_search) {
-    for (Opinion& each : opinions) look_from_overhead(overhead, *each.place, each);
+    // Half a sector of the descriptor and a little more.
+    const double yaw_reach_rad = kPi / parameters_.descriptor.sectors + to_radians(3.0);
+    for (Opinion& each : opinions) look_from_overhead(query.overhead, yaw_reach_rad, each);
     std::stable_sort(opinions.begin(), opinions.end(),
                      [](const Opinion& a, const Opinion& b) { return a.overlap > b.overlap; });
   }
   const auto count = std::min(opinions.size(), static_cast<std::size_t>(parameters_.geometric.candidates));
   opinions.erase(opinions.begin() + static_cast<std::ptrdiff_t>(count), opinions.end());
-  detection.geometric_ms += watch.lap_ms();
+  watch.lap_ms();
   for (Opinion& each : opinions) check_temporal_and_scores(detection.frame, each);
   detection.temporal_ms += watch.lap_ms();
 
   // Each candidate is registered on its own; who finishes first does not matter.
-  std::shared_ptr<const ScanGeometry> query = prepared.geometry;
-  if (!query && std::any_of(opinions.begin(), opinions.end(), [](const Opinion& o) { return o.reason.empty(); }))
-    query = std::make_shared<ScanGeometry>(prepared.cloud);
-  const auto register_one = [&](Opinion& each, double prior_log_odds) {
-    const ScanGeometry match(*each.place);
-    CandidateView view{each.T_guess_match_query, each.overlap};
-    view.prior_log_odds = prior_log_odds;
-    if (const auto usual = ego_motion_.usual_intensity_correlation()) view.usual_intensity_correlation = *usual;
-    each.geometric = check_geometric(match, *query, view, parameters_.geometric);
-    each.reason = each.geometric->reason;
-  };
+  if (std::any_of(opinions.begin(), opinions.end(), [](const Opinion& each) { return each.reason.empty(); }))
+    query.geometry();
   tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-    if (opinions[i].reason.empty())
-      register_one(opinions[i], what_neighbours_say(detection.frame, opinions[i].candidate.match));
+    if (opinions[i].reason.empty()) register_it(query, opinions[i]);
   });
-
-  weigh_against_each_other(detection.frame, opinions);
-  for (const Opinion& each : opinions)
-    if (each.geometric) detection.registered.push_back({each.candidate.match, *each.geometric});
-
-  // The answer is the one that fits best.
-  const Opinion* best = nullptr;
-  for (const Opinion& each : opinions)
-    if (best == nullptr || each.score() > best->score()) best = &each;
-  if (best == nullptr) return ok();
-  Opinion answer = *best;
-  if (answer.reason.empty() && parameters_.geometric.overhead_search) {
-    auto found = nearer_place(overhead, answer, detection);
-    if (!found) return found.error();
-    if (std::optional<Opinion>& nearer = *found) {
-      check_temporal_and_scores(detection.frame, *nearer);
-      // That the scan was found next to it speaks for it as much as neighbours can.
-      if (nearer->reason.empty()) register_one(*nearer, kMostInFavour);
-      if (nearer->reason.empty() && nearer->distance_m() < answer.distance_m()) answer = *std::move(nearer);
-    }
-  }
-  detection.geometric_ms += watch.lap_ms();
-
-  detection.answer = answer.candidate;
-  detection.temporal = std::move(answer.temporal);
-  detection.score = answer.score();
-  detection.reason = answer.reason;
-  detection.geometric = std::move(answer.geometric);
-  if (detection.geometric && detection.geometric->evidence.inlier_ratio >= parameters_.geometric.min_inlier_ratio) {
-    recent_answers_.push_back({detection.frame, answer.candidate.match, loop_log_odds(detection.geometric->evidence)});
-    if (recent_answers_.size() > kAnswersRemembered) recent_answers_.pop_front();
-  }
-  if (detection.reason.empty()) {
-    const GeometricEvidence& found = *detection.geometric;
-    detection.loop =
-        LoopConstraint{detection.frame,       answer.candidate.match, found.T_match_query, found.evidence.inlier_ratio,
-                       found.evidence.rmse_m, found.probability,      found.information};
-  }
-  return ok();
+  return opinions;
 }
 
-void LoopDetector::weigh_against_each_other(FrameId query, std::vector<Opinion>& opinions) const {
+// What speaks for a candidate besides: the most of it counts, not the sum.
+void LoopDetector::weigh_in(Opinion& opinion, double log_odds) const {
+  if (log_odds <= opinion.prior_log_odds) return;
+  opinion.prior_log_odds = log_odds;
+  judge(*opinion.geometric, log_odds, parameters_.geometric);
+  opinion.reason = opinion.geometric->reason;
+}
+
+void LoopDetector::weigh_against_each_other(std::vector<Opinion>& opinions) const {
   // Where a scene shows little, even the right place fits poorly; that all others fit far worse speaks for it then.
   // Chosen on recordings that no reported figure uses (docs/accuracy.md).
   constexpr double kNothingBelow = 8.0, kShare = 0.5, kMost = 5.0;
   for (Opinion& each : opinions) {
     if (!each.geometric) continue;
-    const double own = loop_log_odds(each.geometric->evidence);
+    const double own = each.own_log_odds();
     std::optional<double> runner_up;
     for (const Opinion& other : opinions)
       if (other.geometric &&
           std::abs(other.candidate.match.value - each.candidate.match.value) > parameters_.retrieval.separation_frames)
-        runner_up = std::max(runner_up.value_or(-1e9), loop_log_odds(other.geometric->evidence));
+        runner_up = std::max(runner_up.value_or(-1e9), other.own_log_odds());
     if (!runner_up) continue;
     const double says = std::clamp(kShare * (own - *runner_up - kNothingBelow), 0.0, kMost);
-    if (says > what_neighbours_say(query, each.candidate.match)) {
-      judge(*each.geometric, says, parameters_.geometric);
-      each.reason = each.geometric->reason;
-    }
+    weigh_in(each, says);
   }
 }
 
-double LoopDetector::what_neighbours_say(FrameId query, FrameId match) const {
-  // Scans that follow each other see much the same: each counts for a part of what it says, and all for a limited sum.
-  constexpr std::int64_t kRecent_frames = 10;
-  constexpr double kShare = 0.3, kMostAgainst = 1.0;
-  double sum = 0.0;
-  for (const RecentAnswer& answer : recent_answers_) {
-    const std::int64_t since = query.value - answer.query.value;
-    if (since > 0 && since <= kRecent_frames &&
-        std::abs(match.value - answer.match.value) <= parameters_.retrieval.separation_frames + 2 * since)
-      sum += kShare * answer.log_odds;
-  }
-  return std::clamp(sum, -kMostAgainst, kMostInFavour);
+bool LoopDetector::is_sure(double log_odds) const {
+  return probability_of(log_odds) >= parameters_.geometric.min_probability;
 }
 
-void LoopDetector::look_from_overhead(OverheadSearch& overhead, const ThinCloud& place, Opinion& opinion) const {
-  // Half a sector of the descriptor and a little more.
-  const double yaw_reach_rad = kPi / parameters_.descriptor.sectors + to_radians(3.0);
-  const OverheadMatch found = overhead.search(place, opinion.candidate.yaw_rad, yaw_reach_rad, kOverheadReach_m);
+void LoopDetector::remember_loop(const std::optional<Station>& query, const Opinion& found) {
+  const std::optional<Station>& place = stations_.at(found.candidate.match);
+  if (parameters_.geometric.follow && query && place && is_sure(found.own_log_odds()))
+    track_.add(*query, found.candidate.match, *place, found.geometric->T_match_query, found.own_log_odds());
+}
+
+// Where another place is nearer to the query than the one that was found, and the query fits there too, takes that.
+Status LoopDetector::go_nearer(Query& query, FrameId newest, Opinion& answer) {
+  constexpr double kWorthIt_m = 0.3;
+  if (!parameters_.geometric.overhead_search || answer.distance_m() < kNear_m) return ok();
+  const auto nearest = nearest_place(stations_, answer.candidate.match, answer.geometric->T_match_query, newest);
+  if (!nearest || nearest->T_match_query.translation().norm() + kWorthIt_m > answer.distance_m()) return ok();
+  auto nearer = register_at(query, *nearest);
+  if (!nearer) return nearer.error();
+  // That the query was found next to it speaks for it.
+  if (nearer->geometric && query.scan.station && stations_.at(answer.candidate.match)) {
+    LoopTrack beside;
+    beside.add(*query.scan.station, answer.candidate.match, *stations_.at(answer.candidate.match),
+               answer.geometric->T_match_query, answer.geometric->log_odds);
+    weigh_in(*nearer,
+             beside.in_favour(query.scan.station, stations_.at(nearest->match), nearer->geometric->T_match_query));
+  }
+  if (nearer->reason.empty() && nearer->distance_m() < answer.distance_m()) answer = *std::move(nearer);
+  return ok();
+}
+
+void LoopDetector::look_from_overhead(OverheadSearch& overhead, double yaw_reach_rad, Opinion& opinion) const {
+  const OverheadMatch found =
+      overhead.search(*opinion.place, opinion.candidate.yaw_rad, yaw_reach_rad, kOverheadReach_m);
   opinion.T_guess_match_query = planar_pose(found.x_m, found.y_m, found.yaw_rad);
   opinion.overlap = found.overlap;
   if (found.overlap < parameters_.geometric.min_overlap) {
@@ -296,46 +379,20 @@ void LoopDetector::check_temporal_and_scores(FrameId frame, Opinion& opinion) co
   }
 }
 
-Result<std::optional<LoopDetector::Opinion>> LoopDetector::nearer_place(OverheadSearch& overhead, const Opinion& answer,
-                                                                        const Detection& detection) const {
-  constexpr double kNear_m = 1.5;
-  const Pose& T = answer.geometric->T_match_query;
-  std::optional<Opinion> nearest;
-  if (answer.distance_m() < kNear_m) return nearest;
-  const double yaw_rad = yaw_of(T);
-  const std::int64_t around = 2 * std::int64_t{parameters_.retrieval.separation_frames};
-  double least_m = answer.distance_m();
-  for (std::int64_t frame = answer.candidate.match.value - around; frame <= answer.candidate.match.value + around;
-       ++frame) {
-    if (!T_world_places_.contains(FrameId{frame}) || *detection.newest_searchable < FrameId{frame} ||
-        frame == answer.candidate.match.value)
-      continue;
-    auto place = clouds_->get(FrameId{frame});
-    if (!place) return place.error();
-    const OverheadMatch found = overhead.search(**place, yaw_rad, to_radians(3.0), kOverheadReach_m);
-    const double distance_m = std::hypot(found.x_m, found.y_m);
-    if (found.overlap < parameters_.geometric.min_overlap || distance_m >= least_m) continue;
-    least_m = distance_m;
-    nearest.emplace(answer.candidate);
-    nearest->candidate.match = FrameId{frame};
-    nearest->T_guess_match_query = planar_pose(found.x_m, found.y_m, found.yaw_rad);
-    nearest->overlap = found.overlap;
-    nearest->place = *std::move(place);
-  }
-  return nearest;
-}
-
 Status LoopDetector::remember(PreparedScan prepared, const std::optional<Pose>& T_world_lidar) {
   const FrameId frame = prepared.scan.frame;
   if (const Status status = clouds_->put(frame, std::move(prepared.cloud)); !status) return status;
   index_.add(frame, prepared.scan.stamp_s, prepared.descriptor);
   T_world_places_[frame] = T_world_lidar;
+  stations_[frame] = prepared.station;
   return ok();
 }
 
-void LoopDetector::recall(FrameId frame, double stamp_s, const IntensityScanContext& descriptor) {
+void LoopDetector::recall(FrameId frame, double stamp_s, const IntensityScanContext& descriptor,
+                          const std::optional<Station>& station) {
   index_.add(frame, stamp_s, descriptor);
   T_world_places_[frame] = std::nullopt;
+  stations_[frame] = station;
 }
 
 }  // namespace revisit

@@ -9,6 +9,7 @@
 
 #include <revisit/core/results.hpp>
 #include <revisit/pipeline/ego_motion.hpp>
+#include <revisit/pipeline/loop_track.hpp>
 #include <revisit/pipeline/place_clouds.hpp>
 #include <revisit/pipeline/prepare.hpp>
 #include <revisit/registration/overhead_search.hpp>
@@ -79,17 +80,31 @@ class LoopDetector {
   Result<Detection> detect(const PreparedScan& prepared, const std::optional<Pose>& T_world_lidar, const Past& past);
   Status remember(PreparedScan prepared, const std::optional<Pose>& T_world_lidar);
   /// A place that `clouds` holds already, of an earlier run.
-  void recall(FrameId frame, double stamp_s, const IntensityScanContext& descriptor);
+  void recall(FrameId frame, double stamp_s, const IntensityScanContext& descriptor,
+              const std::optional<Station>& station);
 
   const PlaceIndex& index() const { return index_; }
 
  private:
   // The next scan of the recording: its distortion is undone, and the motion learnt from it.
   Result<PreparedScan> prepare_next(Scan scan);
+  EgoMotion::Step find_motion(PreparedScan& prepared) const;
+  // A scan that is asked about, made ready as far as somebody needs it.
+  struct Query {
+    explicit Query(const PreparedScan& of) : scan(of), overhead(of.cloud), geometry_(of.geometry) {}
+    const ScanGeometry& geometry();
+
+    const PreparedScan& scan;
+    OverheadSearch overhead;
+
+   private:
+    std::shared_ptr<const ScanGeometry> geometry_;
+  };
   // What is found out about a candidate, step by step; `reason` says why it is no loop.
   struct Opinion {
     explicit Opinion(const LoopCandidate& of) : candidate(of), T_guess_match_query(planar_pose(0, 0, of.yaw_rad)) {}
     double score() const;
+    double own_log_odds() const { return loop_log_odds(geometric->evidence); }
     double distance_m() const { return geometric->T_match_query.translation().norm(); }
 
     LoopCandidate candidate;
@@ -97,20 +112,25 @@ class LoopDetector {
     Pose T_guess_match_query;
     double overlap = 0.0;  ///< seen from overhead
     TemporalEvidence temporal;
+    std::shared_ptr<const ScanGeometry> geometry;  ///< of the place, where it was registered
     std::optional<GeometricEvidence> geometric;
+    double prior_log_odds = 0.0;  ///< what speaks for it besides its own evidence
     std::string reason;
   };
 
   Status verify(Detection& detection, const PreparedScan& prepared);
+  // Registers the query on a place that it is known to stand near to: only the pose is open.
+  Result<Opinion> register_at(Query& query, const LoopTrack::Expectation& where);
+  Result<std::vector<Opinion>> ask_candidates(Query& query, Detection& detection);
+  void register_it(Query& query, Opinion& opinion) const;
+  void weigh_in(Opinion& opinion, double log_odds) const;
   // A candidate that fits far better than those elsewhere is the likelier for it: ambiguity against the runner-up.
-  void weigh_against_each_other(FrameId query, std::vector<Opinion>& opinions) const;
-  // Log odds in favour of the match that the scans shortly before give, which were found next to it or were not.
-  double what_neighbours_say(FrameId query, FrameId match) const;
-  void look_from_overhead(OverheadSearch& overhead, const ThinCloud& place, Opinion& opinion) const;
+  void weigh_against_each_other(std::vector<Opinion>& opinions) const;
+  bool is_sure(double log_odds) const;
+  void remember_loop(const std::optional<Station>& query, const Opinion& found);
+  Status go_nearer(Query& query, FrameId newest, Opinion& answer);
+  void look_from_overhead(OverheadSearch& overhead, double yaw_reach_rad, Opinion& opinion) const;
   void check_temporal_and_scores(FrameId frame, Opinion& opinion) const;
-  // The place among the answer's neighbours that the query stands nearest to, if it is another.
-  Result<std::optional<Opinion>> nearer_place(OverheadSearch& overhead, const Opinion& answer,
-                                              const Detection& detection) const;
 
   Parameters parameters_;
   std::optional<IntensityScale> scale_;
@@ -119,14 +139,10 @@ class LoopDetector {
   bool rings_were_reported_ = false;
   PlaceIndex index_;
   std::map<FrameId, std::optional<Pose>> T_world_places_;  ///< odometry, where there was some
+  LoopTrack::Places stations_;                             ///< of all places
   std::unique_ptr<PlaceClouds> clouds_;
   EgoMotion ego_motion_;
-  struct RecentAnswer {
-    FrameId query, match;
-    double log_odds = 0.0;
-  };
-  static constexpr std::size_t kAnswersRemembered = 10;
-  std::deque<RecentAnswer> recent_answers_;
+  LoopTrack track_;
   std::deque<std::pair<FrameId, IntensityScanContext>> recent_queries_;  ///< the last N, for temporal consistency
 };
 

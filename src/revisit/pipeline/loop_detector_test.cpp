@@ -47,6 +47,40 @@ TEST(LoopDetector, FindsThePlaceAndThePoseOfAReverseVisit) {
   EXPECT_FALSE(detection->T_match_query_by_odometry) << "the match came without a pose";
 }
 
+// Something large and near to all sides but one; of the street, a part is left.
+Scan blocked(Scan scan, double open_deg) {
+  const auto half = static_cast<float>(to_radians(open_deg / 2.0));
+  for (Point& p : scan.points)
+    if (std::abs(std::atan2(p.y, p.x)) > half) {
+      const float shrink = std::min(1.f, 4.f / std::hypot(p.x, p.y));
+      p.x *= shrink;
+      p.y *= shrink;
+      p.z *= shrink;
+    }
+  return scan;
+}
+
+TEST(LoopDetector, ALoopIsFollowedPastWhatStandsInTheWay) {
+  const SyntheticWorld world(51);
+  const auto at = [](int i) { return SyntheticWorld::at(-6.0 + i, 0, 0); };
+  const auto run = [&](bool follow, int first) {
+    Parameters parameters;
+    parameters.geometric.follow = follow;
+    LoopDetector detector{parameters};
+    for (int i = 0; i < 8; ++i) EXPECT_TRUE(detector.process(scan_at(world, i, at(i), static_cast<unsigned>(i))));
+    for (int i = first; i < 4; ++i)
+      EXPECT_TRUE(detector.process(scan_at(world, 1000 + i, at(i), 100U + static_cast<unsigned>(i)))->loop);
+    return *detector.process(blocked(scan_at(world, 1004, at(4), 104), 150.0));
+  };
+  const Detection followed = run(true, 0);
+  ASSERT_TRUE(followed.loop) << followed.reason;
+  EXPECT_EQ(followed.loop->match.value, 4);
+  EXPECT_LT(followed.loop->T_match_query.translation().norm(), 0.1);
+  const Detection alone = run(true, 4);
+  EXPECT_FALSE(alone.loop) << "by itself it is not sure enough";
+  EXPECT_FALSE(run(false, 0).loop) << "nor where loops are not followed";
+}
+
 TEST(LoopDetector, TheFirstPlaceCanBeRecognised) {
   const SyntheticWorld world(52);
   LoopDetector detector{Parameters{}};

@@ -13,6 +13,7 @@
 #include <revisit/core/twist.hpp>
 #include <revisit/descriptors/intensity_scan_context.hpp>
 #include <revisit/io/recording.hpp>
+#include <revisit/pipeline/loop_track.hpp>
 #include <revisit/preprocess/ground.hpp>
 #include <revisit/preprocess/intensity.hpp>
 #include <revisit/registration/feature_alignment.hpp>
@@ -27,6 +28,7 @@ struct PreparedScan {
   double ground_z_m = 0.0;                       ///< where the ground below the sensor lies, in its frame
   ThinCloud cloud;                               ///< for registration; the ground is kept and marked
   std::shared_ptr<const ScanGeometry> geometry;  ///< of the cloud, where somebody has asked for it already
+  std::optional<Station> station;                ///< where it was taken along the sensor's way, where that is known
 
   struct Milliseconds {
     double filter = 0.0, ground = 0.0, intensity = 0.0, describe = 0.0, thin = 0.0;

@@ -183,12 +183,19 @@ bool Slam::is_keyframe(const OdometryStep& step, const Scan& swept) const {
   return static_cast<double>(in_view) < parameters_.slam.keyframe_overlap * static_cast<double>(looked);
 }
 
+Station Slam::station_at(const Pose& T_odom_lidar, bool starts_anew) const {
+  if (keyframes_.empty() || starts_anew) return {.piece = station_.piece + 1, .T_piece_lidar = T_odom_lidar};
+  return station_.after(station_.T_piece_lidar.inverse() * T_odom_lidar);
+}
+
 Status Slam::add_keyframe(PreparedScan prepared, const OdometryStep& odometry, bool starts_anew, SlamStep& step) {
   Stopwatch watch;
   if (starts_anew) {
     is_attached_ = false;
     before_piece_ = {keyframes_.back(), last_stamp_s_};
   }
+  const Station station = station_at(odometry.T_odom_lidar, starts_anew);
+  prepared.station = station;
   // What cannot be read back from the store is no loop; the key frame is one all the same.
   auto detection = detector_.detect(prepared, std::nullopt, {false, is_attached_ ? std::nullopt : before_piece_});
   if (!detection)
@@ -223,6 +230,7 @@ Status Slam::add_keyframe(PreparedScan prepared, const OdometryStep& odometry, b
   // From here on memory and store say the same.
   step.is_keyframe = true;
   step.starts_anew = starts_anew;
+  station_ = station;
   if (starts_anew || keyframes_.empty()) anew_ = false;  // before the first there is nothing to be lost from
   add_to_graph(keyframe, edge);
   seen_from_keyframe_ = prepared.cloud.seen;

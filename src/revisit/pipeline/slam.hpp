@@ -73,6 +73,7 @@ class Slam {
   OdometryStep track(Scan& scan, double stamp_s, const std::optional<Pose>& T_before_now, std::optional<Twist>& motion);
   void start_again_with(const Twist& motion);
   bool is_keyframe(const OdometryStep& step, const Scan& swept) const;
+  Station station_at(const Pose& T_odom_lidar, bool starts_anew) const;
   Status add_keyframe(PreparedScan prepared, const OdometryStep& odometry, bool starts_anew, SlamStep& step);
   Status store(const StoredKeyframe& keyframe, const std::optional<StoredEdge>& edge, const Detection* detection);
   void add_to_graph(const StoredKeyframe& keyframe, const std::optional<StoredEdge>& from_last);
@@ -99,6 +100,7 @@ class Slam {
   SeenSpace seen_from_keyframe_;
   std::optional<Scan> first_scan_;  ///< of a piece, as it was swept, until the second one is there
   int untracked_ = 0;               ///< scans in a row
+  Station station_;                 ///< of the last key frame
   bool anew_ = false;               ///< the next key frame begins a new piece
   bool is_attached_ = true;         ///< the piece hangs together with those before by a loop
   std::optional<std::pair<FrameId, double>> before_piece_;  ///< the last key frame before it

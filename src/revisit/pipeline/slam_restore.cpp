@@ -27,6 +27,7 @@ Status Slam::restore() {
                    std::to_string(edge->second->from.value) + ", which is not the one before"};
     if (!std::isfinite(keyframe.stamp_s) || (keyframes_.empty() && keyframe.starts_anew))
       return store_->damaged("time or beginning", keyframe.frame);
+    station_ = station_at(keyframe.T_odom_lidar, keyframe.starts_anew);
     gate_.add_keyframe(keyframe.frame, keyframe.T_odom_lidar, keyframe.starts_anew);
     add_to_graph(keyframe, keyframes_.empty() ? std::nullopt : std::optional<StoredEdge>(*edge->second));
     if (keyframe.starts_anew) {
@@ -43,7 +44,7 @@ Status Slam::restore() {
       return Error{"the map describes places on a grid of " + std::to_string(read->rings) + " x " +
                    std::to_string(read->sectors) + " x " + std::to_string(read->levels) +
                    " cells, not on the one that is asked for: go on with the parameters it was begun with"};
-    detector_.recall(keyframe.frame, keyframe.stamp_s, *read);
+    detector_.recall(keyframe.frame, keyframe.stamp_s, *read, station_);
   }
   for (const StoredEdge& edge : *edges) {
     if (!edge.loop) continue;

@@ -215,17 +215,17 @@ IcpResult align_icp(const Surface& target, std::span<const Eigen::Vector3f> sour
                     const IcpOptions& options) {
   IcpResult result;
   result.T_target_source = T_guess_target_source;
-  constexpr double kShrink = 0.7, kSteady = 0.03;
+  constexpr double kShrink = 0.7, kSteady = 0.03, kToAndFro_m = 0.01;
   double width_m = options.coarse_m;
   for (; result.iterations < options.most_iterations; ++result.iterations) {
     double moved = 0.0;
-    if (!step(target, source, options, width_m, result, moved)) return result;
+    result.converged = false;
+    if (!step(target, source, options, width_m, result, moved)) break;
     result.last_step_m = moved;
     const bool fine = width_m <= options.fine_m;
-    if (fine && moved < options.settled_m) {
-      result.converged = true;
-      break;
-    }
+    if (fine && result.matched < options.least_matched) break;
+    result.converged = fine && moved < kToAndFro_m;
+    if (fine && moved < options.settled_m) break;
     if (moved < kSteady * width_m) width_m = std::max(options.fine_m, width_m * kShrink);
   }
   return result;

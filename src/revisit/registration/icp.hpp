@@ -10,6 +10,7 @@ namespace revisit {
 
 struct IcpResult {
   Pose T_target_source = Pose::Identity();
+  /// Settled, or going to and fro by less than a centimetre 20 m away as neighbours change.
   bool converged = false;
   int iterations = 0;
   double last_step_m = 0.0;  ///< how far the last step moved points 20 m away
@@ -24,8 +25,9 @@ struct IcpResult {
 struct IcpOptions {
   double coarse_m = 4.0, fine_m = 0.5;  ///< widths of the kernel, first and last
   double least_reach_m = 0.0;  ///< points look for a patch within the kernel's width, or this where it is larger
-  double settled_m = 2e-4;     ///< converged where a step at the last width moves points 20 m away less than this
+  double settled_m = 2e-4;     ///< done where a step at the last width moves points 20 m away less than this
   int most_iterations = 60;
+  double least_matched = 0.0;  ///< given up where, at the last width, a smaller share matches: another place
   /// Directions in which the surfaces' normals have on average a smaller square share than this stay as guessed: along
   /// a bare corridor normals are noise. Turns count as the way of a point 10 m away.
   double least_seen = 0.0;

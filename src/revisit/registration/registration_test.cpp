@@ -161,6 +161,19 @@ TEST(Icp, InformationIsSmallAlongACorridor) {
   EXPECT_LT(turned(1, 1), 0.05 * turned(0, 0));
 }
 
+TEST(Icp, GivesUpEarlyWhereTooLittleMatches) {
+  const SurfaceCloud a(thin_scan(SyntheticWorld::at(0, 0, 0)));
+  const Scan scan = SyntheticWorld(32).scan(SyntheticWorld::at(0, 0, 0), {32, 900, -24.8, 5.0});
+  const SurfaceCloud elsewhere(thin(scan.points, {}, 1.0));
+  const IcpResult patient = align_icp(a, elsewhere.points(), Pose::Identity());
+  ASSERT_LT(patient.matched, 0.6);
+  const IcpResult result = align_icp(a, elsewhere.points(), Pose::Identity(), {.least_matched = 0.8});
+  EXPECT_FALSE(result.converged);
+  EXPECT_LT(result.iterations, patient.iterations);
+  const SurfaceCloud here(thin_scan(SyntheticWorld::at(0.5, 0, 0), 2));
+  EXPECT_TRUE(align_icp(a, here.points(), Pose::Identity(), {.least_matched = 0.3}).converged);
+}
+
 TEST(Icp, OfAScanWithItselfIsTheIdentity) {
   const SurfaceCloud a(thin_scan(SyntheticWorld::at(0, 0, 0)));
   const IcpResult result = align_icp(a, a.points(), Pose::Identity());

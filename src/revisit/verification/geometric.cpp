@@ -33,8 +33,12 @@ std::string reason_to_refuse(const GeometricEvidence& found, const GeometricOpti
 
 GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& query, const CandidateView& view,
                                 const GeometricOptions& options) {
-  const IcpResult icp =
-      align_icp(match, query.points(), view.T_guess_match_query, {.coarse_m = options.overhead_search ? 2.0 : 4.0});
+  // Good enough to judge; other places are noticed early (docs/accuracy.md, cost).
+  const IcpResult icp = align_icp(match, query.points(), view.T_guess_match_query,
+                                  {.coarse_m = options.overhead_search ? 2.0 : 4.0,
+                                   .settled_m = 1e-3,
+                                   .most_iterations = 40,
+                                   .least_matched = 0.12});
   const Agreement agreement = measure_agreement(match, query, icp.T_target_source, options.inlier_distance_m);
   GeometricEvidence evidence;
   evidence.T_match_query = icp.T_target_source;
@@ -49,7 +53,7 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
   all.overlap = view.overlap;
   all.distance_m = icp.T_target_source.translation().norm();
   evidence.has_converged = icp.converged;
-  judge(evidence, view.prior_log_odds, options);
+  judge(evidence, 0.0, options);
   return evidence;
 }
 
@@ -60,6 +64,18 @@ void judge(GeometricEvidence& found, double prior_log_odds, const GeometricOptio
   found.probability = probability_of(found.log_odds);
   found.reason = reason_to_refuse(found, options);
   found.consistent = found.reason.empty();
+}
+
+void refine(GeometricEvidence& found, const ScanGeometry& match, const ScanGeometry& query) {
+  // Sparse scans of foliage and of walls seen along single lines have normals that are off; a narrow kernel leaves them
+  // out, while patches are still looked for around.
+  constexpr double kMost_m = 0.15, kMost_rad = 0.02;
+  const IcpResult icp = align_icp(match.surface(), query.surface().points(), found.T_match_query,
+                                  {.coarse_m = 0.25, .fine_m = 0.05, .least_reach_m = 1.0, .settled_m = 1e-3});
+  const Pose moved = found.T_match_query.inverse() * icp.T_target_source;
+  if (!icp.converged || moved.translation().norm() > kMost_m || rotation_angle(moved) > kMost_rad) return;
+  found.T_match_query = icp.T_target_source;
+  found.information = icp.information;
 }
 
 GeometricEvidence check_geometric(const ScanGeometry& match, const ScanGeometry& query, const CandidateView& view,

@@ -70,16 +70,23 @@ TEST(GeometricConsistency, TheFarthestTranslationIsKept) {
   EXPECT_NE(evidence.reason.find("translation 2.0 m above 1.0 m"), std::string::npos) << evidence.reason;
 }
 
-TEST(GeometricConsistency, NeighboursInTimeCount) {
-  ScanGeometry match = scan_at(31, SyntheticWorld::at(0, 0, 0)), query = scan_at(31, SyntheticWorld::at(2, 0, 0));
-  CandidateView view;
-  const double alone = check_geometric(match, query, view, {}).log_odds;
-  view.prior_log_odds = 2.0;
-  EXPECT_DOUBLE_EQ(check_geometric(match, query, view, {}).log_odds, alone + 2.0);
-  view.prior_log_odds = -50.0;
-  const GeometricEvidence refused = check_geometric(match, query, view, {});
-  EXPECT_FALSE(refused.consistent);
-  EXPECT_NE(refused.reason.find("probability 0.000 below 0.950"), std::string::npos) << refused.reason;
+TEST(GeometricConsistency, RefinementTakesWhatIsLeftOfTheErrorAndLeapsNowhere) {
+  const Pose T_match = SyntheticWorld::at(0, 0, 0), T_query = SyntheticWorld::at(2, 1, to_radians(20.0));
+  const ScanGeometry match = scan_at(31, T_match), query = scan_at(31, T_query);
+  const Pose T_truth = T_match.inverse() * T_query;
+  GeometricEvidence found;
+  Vector6 off;
+  off << 0.06, -0.05, 0.03, 0.004, -0.004, 0.006;
+  found.T_match_query = T_truth * small_motion(off);
+  refine(found, match, query);
+  const Pose error = T_truth.inverse() * found.T_match_query;
+  EXPECT_LT(error.translation().norm(), 0.02);
+  EXPECT_LT(to_degrees(rotation_angle(error)), 0.05);
+  EXPECT_GT(found.information(0, 0), 0.0);
+  const Pose far = T_truth * planar_pose(0.3, 0, 0);
+  found.T_match_query = far;
+  refine(found, match, query);
+  EXPECT_TRUE(found.T_match_query.isApprox(far)) << "what lies farther off was not what was judged";
 }
 
 TEST(GeometricConsistency, NothingToRegister) {
