@@ -7,6 +7,7 @@
 #include <limits>
 
 #include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_invoke.h>
 #include <oneapi/tbb/parallel_reduce.h>
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -234,8 +235,10 @@ IcpResult align_icp(const Surface& target, std::span<const Eigen::Vector3f> sour
 Agreement measure_agreement(const SurfaceCloud& target, const SurfaceCloud& source, const Pose& T_target_source,
                             double inlier_distance_m) {
   const double target_range = range_that_holds_most(target), source_range = range_that_holds_most(source);
-  const auto forth = agreement_one_way(target, source, T_target_source, inlier_distance_m, target_range);
-  const auto back = agreement_one_way(source, target, T_target_source.inverse(), inlier_distance_m, source_range);
+  DirectionalAgreement forth, back;
+  tbb::parallel_invoke(
+      [&] { forth = agreement_one_way(target, source, T_target_source, inlier_distance_m, target_range); },
+      [&] { back = agreement_one_way(source, target, T_target_source.inverse(), inlier_distance_m, source_range); });
   const auto ratio = [](const DirectionalAgreement& a) {
     constexpr std::size_t kFewestPoints = 50;  // of fewer, nothing can be said
     return a.visible < kFewestPoints ? 0.0 : static_cast<double>(a.inliers) / static_cast<double>(a.visible);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
 #include <Eigen/Eigenvalues>
 
 #include <revisit/registration/internal/column_grid.hpp>
@@ -36,17 +38,21 @@ SurfaceCloud::SurfaceCloud(ThinCloud cloud) : cloud_(std::move(cloud)) {
   if (cloud_.is_ground.size() != cloud_.points.size()) cloud_.is_ground.assign(cloud_.points.size(), 0);
   if (cloud_.intensity.size() != cloud_.points.size()) cloud_.intensity.assign(cloud_.points.size(), 0.f);
   grid_ = std::make_unique<Grid>(std::span<const Eigen::Vector3f>(cloud_.points), cloud_.voxel_m);
-  normals_.reserve(cloud_.points.size());
-  std::vector<Eigen::Vector3f> around;
-  for (const auto& p : cloud_.points) {
-    // The voxels around; where few of them are occupied, a wider neighbourhood.
-    for (const float radius_m : {1.8f * cloud_.voxel_m, 3.6f * cloud_.voxel_m}) {
-      around.clear();
-      grid_->for_each_within(p, radius_m, [&](std::size_t i, float) { around.push_back(cloud_.points[i]); });
-      if (around.size() >= kFewestNeighbours) break;
+  normals_.resize(cloud_.points.size());
+  constexpr std::size_t kPointsATask = 512;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size(), kPointsATask), [&](const auto& range) {
+    std::vector<Eigen::Vector3f> around;
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      // The voxels around; where few of them are occupied, a wider neighbourhood.
+      for (const float radius_m : {1.8f * cloud_.voxel_m, 3.6f * cloud_.voxel_m}) {
+        around.clear();
+        grid_->for_each_within(cloud_.points[i], radius_m,
+                               [&](std::size_t at, float) { around.push_back(cloud_.points[at]); });
+        if (around.size() >= kFewestNeighbours) break;
+      }
+      normals_[i] = normal_of(around);
     }
-    normals_.push_back(normal_of(around));
-  }
+  });
 }
 
 SurfaceCloud::~SurfaceCloud() = default;

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include <oneapi/tbb/parallel_invoke.h>
+
 #include <revisit/registration/surface_cloud.hpp>
 
 namespace revisit {
@@ -37,8 +39,13 @@ struct Voxel {
 }  // namespace
 
 ThinCloud thin(std::span<const Point> points, std::span<const std::uint8_t> is_ground, double voxel_m) {
-  ThinCloud cloud = thin_surfaces(points, is_ground, voxel_m);
-  if (!points.empty()) cloud.seen = SeenSpace(points);
+  ThinCloud cloud;
+  SeenSpace seen;
+  tbb::parallel_invoke([&] { cloud = thin_surfaces(points, is_ground, voxel_m); },
+                       [&] {
+                         if (!points.empty()) seen = SeenSpace(points);
+                       });
+  cloud.seen = std::move(seen);
   return cloud;
 }
 
