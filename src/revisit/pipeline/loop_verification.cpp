@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <revisit/descriptors/similarity.hpp>
+#include <revisit/pipeline/loop_detector.hpp>
+
+namespace revisit {
+namespace {
+
+constexpr int kOverheadReach_m = 6;  // a translation that retrieval may be off
+constexpr double kNear_m = 1.5;      // nearer, no better place is looked for
+
+}  // namespace
+
+double LoopDetector::Opinion::score() const {
+  // Registration knows best, then the view from overhead, then the descriptors. Flattened, so that no two sure ones
+  // are equal.
+  constexpr double kFlat = 6.0;
+  const double registered = geometric ? 1.0 / (1.0 + std::exp(-own_log_odds() / kFlat)) : 0.0;
+  const double evidence = candidate.geometry_score / 4.0 + overlap / 4.0 + registered;
+  if (!geometric) return evidence;
+  // A loop over more than this is a right constraint, but not the same place (docs/evaluation.md).
+  // Poses have errors: close to the limit it is open which of the two it is.
+  constexpr double kSamePlace_m = 4.0, kOpen_m = 0.5, kRefused = 0.2;
+  const double same_place = std::clamp((kSamePlace_m - distance_m()) / kOpen_m, 0.0, 1.0);
+  return reason.empty() ? evidence + 1.0 + same_place : evidence + kRefused * same_place;
+}
+
+const ScanGeometry& LoopDetector::Query::geometry() {
+  if (!geometry_) geometry_ = std::make_shared<ScanGeometry>(scan.cloud);
+  return *geometry_;
+}
+
+void LoopDetector::register_it(Query& query, Opinion& opinion) const {
+  opinion.geometry = std::make_shared<ScanGeometry>(*opinion.place);
+  CandidateView view{opinion.T_guess_match_query, opinion.overlap};
+  if (const auto usual = ego_motion_.usual_intensity_correlation()) view.usual_intensity_correlation = *usual;
+  opinion.geometric = check_geometric(*opinion.geometry, query.geometry(), view, parameters_.geometric);
+  opinion.reason = opinion.geometric->reason;
+  weigh_in(opinion, track_.in_favour(query.scan.station, stations_.at(opinion.candidate.match),
+                                     opinion.geometric->T_match_query));
+}
+
+Status LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
+  Stopwatch watch;
+  Query query(prepared);
+  std::optional<Opinion> answer;
+
+  // Where the loops of the last metres say that the robot is. Sure and near: nobody else is asked.
+  std::optional<Opinion> expected;
+  if (parameters_.geometric.follow)
+    if (const auto where = track_.expected(prepared.station, stations_, *detection.newest_searchable);
+        where && where->T_match_query.translation().norm() <= kOverheadReach_m) {
+      auto registered = register_at(query, *where);
+      if (!registered) return registered.error();
+      expected = *std::move(registered);
+      if (expected->reason.empty() && is_sure(expected->own_log_odds()) && expected->distance_m() <= kNear_m)
+        answer = expected;
+    }
+  detection.geometric_ms += watch.lap_ms();
+
+  std::vector<Opinion> opinions;
+  if (!answer) {
+    auto asked = ask_candidates(query, detection);
+    if (!asked) return asked.error();
+    opinions = *std::move(asked);
+    detection.geometric_ms += watch.lap_ms();
+    const auto is_expected = [&](const Opinion& each) { return each.candidate.match == expected->candidate.match; };
+    if (expected && std::none_of(opinions.begin(), opinions.end(), is_expected)) opinions.push_back(*expected);
+    weigh_against_each_other(opinions);
+    const Opinion* best = nullptr;
+    for (const Opinion& each : opinions)
+      if (best == nullptr || each.score() > best->score()) best = &each;
+    if (best == nullptr) return ok();
+    answer = *best;
+  } else {
+    opinions.push_back(*answer);
+  }
+  for (const Opinion& each : opinions)
+    if (each.geometric) detection.registered.push_back({each.candidate.match, *each.geometric});
+
+  if (answer->reason.empty()) {
+    remember_loop(prepared.station, *answer);
+    if (const Status status = go_nearer(query, *detection.newest_searchable, *answer); !status) return status;
+    refine(*answer->geometric, *answer->geometry, query.geometry());
+  }
+  detection.geometric_ms += watch.lap_ms();
+
+  detection.answer = answer->candidate;
+  detection.temporal = std::move(answer->temporal);
+  detection.score = answer->score();
+  detection.reason = answer->reason;
+  detection.geometric = std::move(answer->geometric);
+  if (detection.reason.empty()) {
+    const GeometricEvidence& found = *detection.geometric;
+    detection.loop =
+        LoopConstraint{detection.frame,       detection.answer->match, found.T_match_query, found.evidence.inlier_ratio,
+                       found.evidence.rmse_m, found.probability,       found.information};
+  }
+  return ok();
+}
+
+Result<LoopDetector::Opinion> LoopDetector::register_at(Query& query, const LoopTrack::Expectation& where) {
+  LoopCandidate candidate;
+  if (const auto descriptor = index_.find(where.match))
+    candidate = match_descriptors(query.scan.descriptor, *descriptor);
+  candidate.match = where.match;
+  candidate.yaw_rad = yaw_of(where.T_match_query);
+  auto place = clouds_->get(where.match);
+  if (!place) return place.error();
+  Opinion opinion(candidate);
+  opinion.place = *std::move(place);
+  look_from_overhead(query.overhead, to_radians(3.0), opinion);
+  opinion.T_guess_match_query = where.T_match_query;
+  opinion.reason.clear();  // however little overlaps: something stands in the way, not elsewhere
+  check_temporal_and_scores(query.scan.scan.frame, opinion);
+  if (opinion.reason.empty()) register_it(query, opinion);
+  return opinion;
+}
+
+// The candidates of retrieval that look best from overhead, registered.
+Result<std::vector<LoopDetector::Opinion>> LoopDetector::ask_candidates(Query& query, Detection& detection) {
+  std::vector<Opinion> opinions;
+  for (const LoopCandidate& candidate : detection.candidates) {
+    auto place = clouds_->get(candidate.match);
+    if (!place) return place.error();
+    opinions.emplace_back(candidate).place = *std::move(place);
+  }
+  Stopwatch watch;
+  if (parameters_.geometric.overhead_search) {
+    // Half a sector of the descriptor and a little more.
+    const double yaw_reach_rad = kPi / parameters_.descriptor.sectors + to_radians(3.0);
+    for (Opinion& each : opinions) look_from_overhead(query.overhead, yaw_reach_rad, each);
+    std::stable_sort(opinions.begin(), opinions.end(),
+                     [](const Opinion& a, const Opinion& b) { return a.overlap > b.overlap; });
+  }
+  const auto count = std::min(opinions.size(), static_cast<std::size_t>(parameters_.geometric.candidates));
+  opinions.erase(opinions.begin() + static_cast<std::ptrdiff_t>(count), opinions.end());
+  watch.lap_ms();
+  for (Opinion& each : opinions) check_temporal_and_scores(detection.frame, each);
+  detection.temporal_ms += watch.lap_ms();
+
+  // Each candidate is registered on its own; who finishes first does not matter.
+  if (std::any_of(opinions.begin(), opinions.end(), [](const Opinion& each) { return each.reason.empty(); }))
+    query.geometry();
+  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+    if (opinions[i].reason.empty()) register_it(query, opinions[i]);
+  });
+  return opinions;
+}
+
+// What speaks for a candidate besides: the most of it counts, not the sum.
+void LoopDetector::weigh_in(Opinion& opinion, double log_odds) const {
+  if (log_odds <= opinion.prior_log_odds) return;
+  opinion.prior_log_odds = log_odds;
+  judge(*opinion.geometric, log_odds, parameters_.geometric);
+  opinion.reason = opinion.geometric->reason;
+}
+
+void LoopDetector::weigh_against_each_other(std::vector<Opinion>& opinions) const {
+  // Where a scene shows little, even the right place fits poorly; that all others fit far worse speaks for it then.
+  // Chosen on recordings that no reported figure uses (docs/accuracy.md).
+  constexpr double kNothingBelow = 8.0, kShare = 0.5, kMost = 5.0;
+  for (Opinion& each : opinions) {
+    if (!each.geometric) continue;
+    const double own = each.own_log_odds();
+    std::optional<double> runner_up;
+    for (const Opinion& other : opinions)
+      if (other.geometric &&
+          std::abs(other.candidate.match.value - each.candidate.match.value) > parameters_.retrieval.separation_frames)
+        runner_up = std::max(runner_up.value_or(-1e9), other.own_log_odds());
+    if (!runner_up) continue;
+    const double says = std::clamp(kShare * (own - *runner_up - kNothingBelow), 0.0, kMost);
+    weigh_in(each, says);
+  }
+}
+
+bool LoopDetector::is_sure(double log_odds) const {
+  return probability_of(log_odds) >= parameters_.geometric.min_probability;
+}
+
+void LoopDetector::remember_loop(const std::optional<Station>& query, const Opinion& found) {
+  const std::optional<Station>& place = stations_.at(found.candidate.match);
+  if (parameters_.geometric.follow && query && place && is_sure(found.own_log_odds()))
+    track_.add(*query, found.candidate.match, *place, found.geometric->T_match_query, found.own_log_odds());
+}
+
+// Where another place is nearer to the query than the one that was found, and the query fits there too, takes that.
+Status LoopDetector::go_nearer(Query& query, FrameId newest, Opinion& answer) {
+  constexpr double kWorthIt_m = 0.3;
+  if (!parameters_.geometric.overhead_search || answer.distance_m() < kNear_m) return ok();
+  const auto nearest = nearest_place(stations_, answer.candidate.match, answer.geometric->T_match_query, newest);
+  if (!nearest || nearest->T_match_query.translation().norm() + kWorthIt_m > answer.distance_m()) return ok();
+  auto nearer = register_at(query, *nearest);
+  if (!nearer) return nearer.error();
+  // That the query was found next to it speaks for it.
+  if (nearer->geometric && query.scan.station && stations_.at(answer.candidate.match)) {
+    LoopTrack beside;
+    beside.add(*query.scan.station, answer.candidate.match, *stations_.at(answer.candidate.match),
+               answer.geometric->T_match_query, answer.geometric->log_odds);
+    weigh_in(*nearer,
+             beside.in_favour(query.scan.station, stations_.at(nearest->match), nearer->geometric->T_match_query));
+  }
+  if (nearer->reason.empty() && nearer->distance_m() < answer.distance_m()) answer = *std::move(nearer);
+  return ok();
+}
+
+void LoopDetector::look_from_overhead(OverheadSearch& overhead, double yaw_reach_rad, Opinion& opinion) const {
+  const OverheadMatch found =
+      overhead.search(*opinion.place, opinion.candidate.yaw_rad, yaw_reach_rad, kOverheadReach_m);
+  opinion.T_guess_match_query = planar_pose(found.x_m, found.y_m, found.yaw_rad);
+  opinion.overlap = found.overlap;
+  if (found.overlap < parameters_.geometric.min_overlap) {
+    char text[96];
+    std::snprintf(text, sizeof text, "overlap from overhead %.2f below %.2f", found.overlap,
+                  parameters_.geometric.min_overlap);
+    opinion.reason = text;
+  }
+}
+
+void LoopDetector::check_temporal_and_scores(FrameId frame, Opinion& opinion) const {
+  const auto query_descriptor = [&](FrameId of) -> std::optional<DescriptorView> {
+    const auto found = std::find_if(recent_queries_.begin(), recent_queries_.end(),
+                                    [&](const auto& each) { return each.first == of; });
+    if (found == recent_queries_.end()) return std::nullopt;
+    return found->second;
+  };
+  const auto match_descriptor = [&](FrameId of) { return index_.find(of); };
+  opinion.temporal =
+      check_temporal(frame, opinion.candidate.match, query_descriptor, match_descriptor, parameters_.temporal);
+  if (!opinion.reason.empty()) return;
+  if (opinion.candidate.score() < parameters_.geometric.min_descriptor_score) {
+    char text[96];
+    std::snprintf(text, sizeof text, "descriptor score %.3f below %.3f", opinion.candidate.score(),
+                  parameters_.geometric.min_descriptor_score);
+    opinion.reason = text;
+  } else if (!opinion.temporal.consistent) {
+    opinion.reason = opinion.temporal.reason;
+  }
+}
+
+}  // namespace revisit
