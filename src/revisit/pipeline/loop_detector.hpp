@@ -128,7 +128,7 @@ class LoopDetector {
   void weigh_against_each_other(std::vector<Opinion>& opinions) const;
   bool is_sure(double log_odds) const;
   void remember_loop(const std::optional<Station>& query, const Opinion& found);
-  Status go_nearer(Query& query, FrameId newest, Opinion& answer);
+  Status go_nearer(Query& query, FrameId newest, std::vector<Opinion>& opinions, Opinion& answer);
   void look_from_overhead(OverheadSearch& overhead, double yaw_reach_rad, Opinion& opinion) const;
   void check_temporal_and_scores(FrameId frame, Opinion& opinion) const;
 

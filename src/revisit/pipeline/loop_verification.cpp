@@ -83,9 +83,10 @@ Status LoopDetector::verify(Detection& detection, const PreparedScan& prepared) 
   for (const Opinion& each : opinions)
     if (each.geometric) detection.registered.push_back({each.candidate.match, *each.geometric});
 
+  if (answer->reason.empty())
+    if (const Status status = go_nearer(query, *detection.newest_searchable, opinions, *answer); !status) return status;
   if (answer->reason.empty()) {
     remember_loop(prepared.station, *answer);
-    if (const Status status = go_nearer(query, *detection.newest_searchable, *answer); !status) return status;
     refine(*answer->geometric, *answer->geometry, query.geometry());
   }
   detection.geometric_ms += watch.lap_ms();
@@ -165,13 +166,13 @@ void LoopDetector::weigh_against_each_other(std::vector<Opinion>& opinions) cons
   // Where a scene shows little, even the right place fits poorly; that all others fit far worse speaks for it then.
   // Chosen on recordings that no reported figure uses (docs/accuracy.md).
   constexpr double kNothingBelow = 8.0, kShare = 0.5, kMost = 5.0;
+  const std::int64_t elsewhere = 2 * std::int64_t{parameters_.retrieval.separation_frames};
   for (Opinion& each : opinions) {
     if (!each.geometric) continue;
     const double own = each.own_log_odds();
     std::optional<double> runner_up;
     for (const Opinion& other : opinions)
-      if (other.geometric &&
-          std::abs(other.candidate.match.value - each.candidate.match.value) > parameters_.retrieval.separation_frames)
+      if (other.geometric && std::abs(other.candidate.match.value - each.candidate.match.value) > elsewhere)
         runner_up = std::max(runner_up.value_or(-1e9), other.own_log_odds());
     if (!runner_up) continue;
     const double says = std::clamp(kShare * (own - *runner_up - kNothingBelow), 0.0, kMost);
@@ -189,23 +190,22 @@ void LoopDetector::remember_loop(const std::optional<Station>& query, const Opin
     track_.add(*query, found.candidate.match, *place, found.geometric->T_match_query, found.own_log_odds());
 }
 
-// Where another place is nearer to the query than the one that was found, and the query fits there too, takes that.
-Status LoopDetector::go_nearer(Query& query, FrameId newest, Opinion& answer) {
-  constexpr double kWorthIt_m = 0.3;
+// Where another place is nearer to the query than the one that was found, asks that too. From far away little fits even
+// at the right place, and much is forgiven; what is much nearer must fit by itself, so that it decides.
+Status LoopDetector::go_nearer(Query& query, FrameId newest, std::vector<Opinion>& opinions, Opinion& answer) {
+  constexpr double kWorthIt_m = 0.3, kMuchNearer = 0.5;
   if (!parameters_.geometric.overhead_search || answer.distance_m() < kNear_m) return ok();
   const auto nearest = nearest_place(stations_, answer.candidate.match, answer.geometric->T_match_query, newest);
-  if (!nearest || nearest->T_match_query.translation().norm() + kWorthIt_m > answer.distance_m()) return ok();
+  if (!nearest) return ok();
+  const double nearest_m = nearest->T_match_query.translation().norm();
+  if (nearest_m + kWorthIt_m > answer.distance_m()) return ok();
   auto nearer = register_at(query, *nearest);
   if (!nearer) return nearer.error();
-  // That the query was found next to it speaks for it.
-  if (nearer->geometric && query.scan.station && stations_.at(answer.candidate.match)) {
-    LoopTrack beside;
-    beside.add(*query.scan.station, answer.candidate.match, *stations_.at(answer.candidate.match),
-               answer.geometric->T_match_query, answer.geometric->log_odds);
-    weigh_in(*nearer,
-             beside.in_favour(query.scan.station, stations_.at(nearest->match), nearer->geometric->T_match_query));
-  }
-  if (nearer->reason.empty() && nearer->distance_m() < answer.distance_m()) answer = *std::move(nearer);
+  opinions.push_back(*std::move(nearer));
+  weigh_against_each_other(opinions);
+  const Opinion& found = opinions.back();
+  const bool decides = nearest_m < kMuchNearer * answer.distance_m();
+  if (decides || (found.reason.empty() && found.distance_m() < answer.distance_m())) answer = found;
   return ok();
 }
 
