@@ -4,7 +4,8 @@
 
 usage: scripts/learn_probability.py FOLDER [FOLDER ...]
 Each folder is written by `revisit detect --evidence --geometric.min_overlap 0.35 --geometric.candidates 5
---geometric.follow false` over a recording with exact poses. Every recording weighs the same, and in each the right poses as much as the wrong ones.
+--geometric.follow false` over a recording with exact poses. Every recording weighs the same, and in each the right
+poses as much as the wrong ones.
 Prints the coefficients, then, for each recording, what a model learnt on all the others says about it."""
 import csv
 import pathlib

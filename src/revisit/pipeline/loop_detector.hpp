@@ -31,10 +31,10 @@ struct Detection {
     FrameId match;
     GeometricEvidence evidence;
   };
-  std::vector<Registered> registered;  ///< every candidate that was registered, accepted or not
-  std::optional<LoopConstraint> loop;  ///< set where the answer was accepted
-  double score = 0.0;  ///< confidence that orders answers: mean descriptor score, plus the inlier ratio if registered
-  std::string reason;  ///< why there is no loop; empty where there is one
+  std::vector<Registered> registered;             ///< every candidate that was registered, accepted or not
+  std::optional<LoopConstraint> loop;             ///< set where the answer was accepted
+  double score = 0.0;                             ///< confidence that orders answers (docs/method.md, section 7)
+  std::string reason;                             ///< why there is no loop; empty where there is one
   std::optional<Pose> T_match_query_by_odometry;  ///< for comparison, where both scans came with a pose
 
   std::size_t points = 0, ground_points = 0;
