@@ -44,9 +44,10 @@ const std::vector<Pair>& pairs() {
 }
 
 void thin_scan(benchmark::State& state) {
+  const auto& all = pairs();
   std::size_t next = 0, points = 0;
   for (auto _ : state) {
-    const Scan& scan = pairs()[next++ % pairs().size()].target_scan;
+    const Scan& scan = all[next++ % all.size()].target_scan;
     benchmark::DoNotOptimize(thin(scan.points, {}, 1.0).points.data());
     points += scan.points.size();
   }

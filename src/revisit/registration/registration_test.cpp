@@ -54,6 +54,25 @@ TEST(SurfaceCloud, NormalsOfAPlane) {
   EXPECT_FALSE(cloud.nearest(Eigen::Vector3f(3.2f, 4.1f, 9.5f), 4.f)) << "none within 2 m";
 }
 
+TEST(SurfaceCloud, ASingleLineHasNoSide) {
+  // Level ground where a sensor of few lines sees a line every 3 m, and one line far from all others.
+  std::mt19937 random(7);
+  std::normal_distribution<float> noise(0.f, 0.02f);
+  std::vector<Point> points;
+  const auto add_line = [&](float y) {
+    for (float x = -20.f; x < 20.f; x += 0.5f) points.push_back({x, y, noise(random), 0.f});
+  };
+  for (const float y : {-6.f, -3.f, 0.f, 3.f}) add_line(y);
+  add_line(30.f);
+  const SurfaceCloud cloud(thin(points, {}, 1.0));
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (cloud.point(i).y() > 20.f)
+      EXPECT_TRUE(cloud.normal(i).isZero()) << cloud.point(i).transpose();
+    else
+      EXPECT_GT(std::abs(cloud.normal(i).z()), 0.999f) << cloud.point(i).transpose();
+  }
+}
+
 TEST(SurfaceCloud, NearestIsThatOfTryingAllWhateverTheReach) {
   std::mt19937 random(4);
   ThinCloud cloud;

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/registration/surface_cloud.hpp>
 
-#include <algorithm>
-#include <cmath>
-
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <Eigen/Eigenvalues>
@@ -13,20 +10,30 @@
 namespace revisit {
 namespace {
 
-constexpr std::size_t kFewestNeighbours = 5;
+constexpr float kFewestNeighbours = 5.f;
+constexpr float kLeastSpread = 0.5f;  // of a plane's narrower side (standard deviation), in voxels
 
-// The direction in which the points spread least.
-Eigen::Vector3f normal_of(const std::vector<Eigen::Vector3f>& points) {
-  if (points.size() < kFewestNeighbours) return Eigen::Vector3f::Zero();
-  Eigen::Vector3f mean = Eigen::Vector3f::Zero();
-  for (const auto& p : points) mean += p;
-  mean /= static_cast<float>(points.size());
-  Eigen::Matrix3f covariance = Eigen::Matrix3f::Zero();
-  for (const auto& p : points) covariance += (p - mean) * (p - mean).transpose();
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
-  solver.computeDirect(covariance);
-  return solver.eigenvectors().col(0);
-}
+// Points about one of them, summed up.
+struct Neighbourhood {
+  float count = 0.f;
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  Eigen::Matrix3f squares = Eigen::Matrix3f::Zero();
+
+  void add(const Eigen::Vector3f& offset) {
+    count += 1.f;
+    sum += offset;
+    squares.noalias() += offset * offset.transpose();
+  }
+  // The direction in which the points spread least; zero where they lie along a line, whose sides are noise.
+  Eigen::Vector3f normal(float least_spread_m) const {
+    if (count < kFewestNeighbours) return Eigen::Vector3f::Zero();
+    const Eigen::Vector3f mean = sum / count;
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
+    solver.computeDirect(squares / count - mean * mean.transpose());
+    if (solver.eigenvalues()[1] < least_spread_m * least_spread_m) return Eigen::Vector3f::Zero();
+    return solver.eigenvectors().col(0);
+  }
+};
 
 }  // namespace
 
@@ -41,16 +48,22 @@ SurfaceCloud::SurfaceCloud(ThinCloud cloud) : cloud_(std::move(cloud)) {
   normals_.resize(cloud_.points.size());
   constexpr std::size_t kPointsATask = 512;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size(), kPointsATask), [&](const auto& range) {
-    std::vector<Eigen::Vector3f> around;
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      // The voxels around; where few of them are occupied, a wider neighbourhood.
-      for (const float radius_m : {1.8f * cloud_.voxel_m, 3.6f * cloud_.voxel_m}) {
-        around.clear();
-        grid_->for_each_within(cloud_.points[i], radius_m,
-                               [&](std::size_t at, float) { around.push_back(cloud_.points[at]); });
-        if (around.size() >= kFewestNeighbours) break;
-      }
-      normals_[i] = normal_of(around);
+      const Eigen::Vector3f& centre = cloud_.points[i];
+      const float voxel_m = cloud_.voxel_m, least_spread_m = kLeastSpread * voxel_m;
+      // The voxels around; where they hold a single line of the sensor, a wider neighbourhood, or a wider one yet.
+      Neighbourhood near, wide, wider;
+      const auto gather = [&](float radius, const auto& add) { grid_->for_each_within(centre, radius * voxel_m, add); };
+      gather(1.8f, [&](std::size_t at, float) { near.add(cloud_.points[at] - centre); });
+      normals_[i] = near.normal(least_spread_m);
+      if (!normals_[i].isZero()) continue;
+      gather(3.6f, [&](std::size_t at, float squared_m2) {
+        const Eigen::Vector3f offset = cloud_.points[at] - centre;
+        if (squared_m2 < 2.5f * 2.5f * voxel_m * voxel_m) wide.add(offset);
+        wider.add(offset);
+      });
+      normals_[i] = wide.normal(least_spread_m);
+      if (normals_[i].isZero()) normals_[i] = wider.normal(least_spread_m);
     }
   });
 }

@@ -45,7 +45,7 @@ class SurfaceCloud final : public Surface {
   std::span<const Eigen::Vector3f> points() const { return cloud_.points; }
   std::span<const Eigen::Vector3f> normals() const { return normals_; }
   const Eigen::Vector3f& point(std::size_t i) const { return cloud_.points[i]; }
-  /// Unit normal, sign arbitrary; zero where fewer than five neighbours gave none.
+  /// Unit normal, sign arbitrary; zero where the neighbours are fewer than five or on one line.
   const Eigen::Vector3f& normal(std::size_t i) const { return normals_[i]; }
   bool is_ground(std::size_t i) const { return cloud_.is_ground[i] != 0; }
   float intensity(std::size_t i) const { return cloud_.intensity[i]; }
