@@ -85,8 +85,8 @@ def main():
             odds, own = X[:, columns] @ s + c, X[:, columns] @ slopes + constant
             found = {q: max(odds[right & (queries == q)]) for q in set(queries[right])}
             best = np.array(list(found.values()))
-            taken = [f"{(best > t).mean():.3f}/{(odds[~right] > t).sum()}" for t in (0.0, 1.0, 2.0, 3.0)]
-            print(f"  {folder.name}: {right.sum()} right, {(~right).sum()} wrong; learnt on the others, queries found / "
+            taken = [f"{(best > t).sum()}/{(odds[~right] > t).sum()}" for t in (0.0, 1.0, 2.0, 3.0)]
+            print(f"  {folder.name}: {right.sum()} right, {(~right).sum()} wrong; learnt on the others, of {len(best)} queries found / "
                   f"wrong ones taken at log odds 0, 1, 2, 3: {', '.join(taken)}; most of a wrong one "
                   f"{odds[~right].max(initial=-99):.2f}, {own[~right].max(initial=-99):.2f} learnt on all")
 

@@ -114,21 +114,28 @@ class LoopDetector {
     TemporalEvidence temporal;
     std::shared_ptr<const ScanGeometry> geometry;  ///< of the place, where it was registered
     std::optional<GeometricEvidence> geometric;
-    double prior_log_odds = 0.0;  ///< what speaks for it besides its own evidence
+    // What speaks for it besides its own evidence: that the sensor's way leads there, that all others fit worse.
+    double followed_log_odds = 0.0, ahead_log_odds = 0.0;
     std::string reason;
   };
 
   Status verify(Detection& detection, const PreparedScan& prepared);
   // Registers the query on a place that it is known to stand near to: only the pose is open.
   Result<Opinion> register_at(Query& query, const LoopTrack::Expectation& where);
-  Result<std::vector<Opinion>> ask_candidates(Query& query, Detection& detection);
+  Result<std::vector<Opinion>> look_at_candidates(Query& query, const Detection& detection) const;
+  std::vector<Opinion> ask_best(Query& query, std::vector<Opinion>& candidates, Detection& detection) const;
   void register_it(Query& query, Opinion& opinion) const;
-  void weigh_in(Opinion& opinion, double log_odds) const;
+  void judge_with_context(Opinion& opinion) const;
+  bool are_elsewhere(const Opinion& a, const Opinion& b) const;
+  static const Opinion* likeliest(const std::vector<Opinion>& opinions);
+  void ask_runner_up(Query& query, const Opinion* unsure, std::vector<Opinion>& opinions,
+                     const std::vector<Opinion>& others) const;
   // A candidate that fits far better than those elsewhere is the likelier for it: ambiguity against the runner-up.
   void weigh_against_each_other(std::vector<Opinion>& opinions) const;
   bool is_sure(double log_odds) const;
   void remember_loop(const std::optional<Station>& query, const Opinion& found);
-  Status go_nearer(Query& query, FrameId newest, std::vector<Opinion>& opinions, Opinion& answer);
+  Status go_nearer(Query& query, FrameId newest, std::vector<Opinion>& opinions, const std::vector<Opinion>& others,
+                   Opinion& answer);
   void look_from_overhead(OverheadSearch& overhead, double yaw_reach_rad, Opinion& opinion) const;
   void check_temporal_and_scores(FrameId frame, Opinion& opinion) const;
 

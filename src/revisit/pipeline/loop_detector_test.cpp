@@ -70,7 +70,7 @@ TEST(LoopDetector, ALoopIsFollowedPastWhatStandsInTheWay) {
     for (int i = 0; i < 8; ++i) EXPECT_TRUE(detector.process(scan_at(world, i, at(i), static_cast<unsigned>(i))));
     for (int i = first; i < 4; ++i)
       EXPECT_TRUE(detector.process(scan_at(world, 1000 + i, at(i), 100U + static_cast<unsigned>(i)))->loop);
-    return *detector.process(blocked(scan_at(world, 1004, at(4), 104), 150.0));
+    return *detector.process(blocked(scan_at(world, 1004, at(4), 104), 110.0));
   };
   const Detection followed = run(true, 0);
   ASSERT_TRUE(followed.loop) << followed.reason;
@@ -79,6 +79,22 @@ TEST(LoopDetector, ALoopIsFollowedPastWhatStandsInTheWay) {
   const Detection alone = run(true, 4);
   EXPECT_FALSE(alone.loop) << "by itself it is not sure enough";
   EXPECT_FALSE(run(false, 0).loop) << "nor where loops are not followed";
+}
+
+TEST(LoopDetector, AnUnsurePlaceIsComparedWithTheBestOneElsewhere) {
+  const SyntheticWorld world(51), away(54);
+  const auto query = blocked(scan_at(world, 1000, SyntheticWorld::at(0, 0, 0), 104), 110.0);
+  const auto run = [&](bool knows_another) {
+    LoopDetector detector{Parameters{}};
+    for (int i = 0; i < 8; ++i)
+      EXPECT_TRUE(detector.add(scan_at(world, i, SyntheticWorld::at(-4.0 + i, 0, 0), static_cast<unsigned>(i))));
+    if (knows_another) EXPECT_TRUE(detector.add(scan_at(away, 100, SyntheticWorld::at(0, 0, 0), 20)));
+    return *detector.process(query);
+  };
+  EXPECT_FALSE(run(false).loop) << "nobody to compare with";
+  const Detection compared = run(true);
+  ASSERT_TRUE(compared.loop) << compared.reason;
+  EXPECT_EQ(compared.loop->match.value, 4);
 }
 
 TEST(LoopDetector, TheFirstPlaceCanBeRecognised) {

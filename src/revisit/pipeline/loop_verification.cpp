@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
+#include <utility>
 
 #include <oneapi/tbb/parallel_for.h>
 
@@ -13,6 +15,7 @@ namespace {
 
 constexpr int kOverheadReach_m = 6;  // a translation that retrieval may be off
 constexpr double kNear_m = 1.5;      // nearer, no better place is looked for
+constexpr double kMostAhead = 5.0;   // log odds, of being ahead of the runner-up
 
 }  // namespace
 
@@ -40,9 +43,9 @@ void LoopDetector::register_it(Query& query, Opinion& opinion) const {
   CandidateView view{opinion.T_guess_match_query, opinion.overlap};
   if (const auto usual = ego_motion_.usual_intensity_correlation()) view.usual_intensity_correlation = *usual;
   opinion.geometric = check_geometric(*opinion.geometry, query.geometry(), view, parameters_.geometric);
-  opinion.reason = opinion.geometric->reason;
-  weigh_in(opinion, track_.in_favour(query.scan.station, stations_.at(opinion.candidate.match),
-                                     opinion.geometric->T_match_query));
+  opinion.followed_log_odds =
+      track_.in_favour(query.scan.station, stations_.at(opinion.candidate.match), opinion.geometric->T_match_query);
+  judge_with_context(opinion);
 }
 
 Status LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
@@ -63,14 +66,16 @@ Status LoopDetector::verify(Detection& detection, const PreparedScan& prepared) 
     }
   detection.geometric_ms += watch.lap_ms();
 
-  std::vector<Opinion> opinions;
+  std::vector<Opinion> opinions, others;
   if (!answer) {
-    auto asked = ask_candidates(query, detection);
-    if (!asked) return asked.error();
-    opinions = *std::move(asked);
+    auto candidates = look_at_candidates(query, detection);
+    if (!candidates) return candidates.error();
+    opinions = ask_best(query, *candidates, detection);
     detection.geometric_ms += watch.lap_ms();
     const auto is_expected = [&](const Opinion& each) { return each.candidate.match == expected->candidate.match; };
     if (expected && std::none_of(opinions.begin(), opinions.end(), is_expected)) opinions.push_back(*expected);
+    others = *std::move(candidates);
+    ask_runner_up(query, likeliest(opinions), opinions, others);
     weigh_against_each_other(opinions);
     const Opinion* best = nullptr;
     for (const Opinion& each : opinions)
@@ -84,7 +89,8 @@ Status LoopDetector::verify(Detection& detection, const PreparedScan& prepared) 
     if (each.geometric) detection.registered.push_back({each.candidate.match, *each.geometric});
 
   if (answer->reason.empty())
-    if (const Status status = go_nearer(query, *detection.newest_searchable, opinions, *answer); !status) return status;
+    if (const Status status = go_nearer(query, *detection.newest_searchable, opinions, others, *answer); !status)
+      return status;
   if (answer->reason.empty()) {
     remember_loop(prepared.station, *answer);
     refine(*answer->geometric, *answer->geometry, query.geometry());
@@ -123,60 +129,96 @@ Result<LoopDetector::Opinion> LoopDetector::register_at(Query& query, const Loop
   return opinion;
 }
 
-// The candidates of retrieval that look best from overhead, registered.
-Result<std::vector<LoopDetector::Opinion>> LoopDetector::ask_candidates(Query& query, Detection& detection) {
+// The candidates of retrieval, those first that look best from overhead.
+Result<std::vector<LoopDetector::Opinion>> LoopDetector::look_at_candidates(Query& query,
+                                                                            const Detection& detection) const {
   std::vector<Opinion> opinions;
   for (const LoopCandidate& candidate : detection.candidates) {
     auto place = clouds_->get(candidate.match);
     if (!place) return place.error();
     opinions.emplace_back(candidate).place = *std::move(place);
   }
+  if (!parameters_.geometric.overhead_search) return opinions;
+  // Half a sector of the descriptor and a little more.
+  const double yaw_reach_rad = kPi / parameters_.descriptor.sectors + to_radians(3.0);
+  for (Opinion& each : opinions) look_from_overhead(query.overhead, yaw_reach_rad, each);
+  std::stable_sort(opinions.begin(), opinions.end(),
+                   [](const Opinion& a, const Opinion& b) { return a.overlap > b.overlap; });
+  return opinions;
+}
+
+// Takes as many as are to be registered from the front of the candidates.
+std::vector<LoopDetector::Opinion> LoopDetector::ask_best(Query& query, std::vector<Opinion>& candidates,
+                                                          Detection& detection) const {
+  const auto count = std::min(candidates.size(), static_cast<std::size_t>(parameters_.geometric.candidates));
+  const auto rest = candidates.begin() + static_cast<std::ptrdiff_t>(count);
+  std::vector<Opinion> opinions(std::make_move_iterator(candidates.begin()), std::make_move_iterator(rest));
+  candidates.erase(candidates.begin(), rest);
   Stopwatch watch;
-  if (parameters_.geometric.overhead_search) {
-    // Half a sector of the descriptor and a little more.
-    const double yaw_reach_rad = kPi / parameters_.descriptor.sectors + to_radians(3.0);
-    for (Opinion& each : opinions) look_from_overhead(query.overhead, yaw_reach_rad, each);
-    std::stable_sort(opinions.begin(), opinions.end(),
-                     [](const Opinion& a, const Opinion& b) { return a.overlap > b.overlap; });
-  }
-  const auto count = std::min(opinions.size(), static_cast<std::size_t>(parameters_.geometric.candidates));
-  opinions.erase(opinions.begin() + static_cast<std::ptrdiff_t>(count), opinions.end());
-  watch.lap_ms();
   for (Opinion& each : opinions) check_temporal_and_scores(detection.frame, each);
   detection.temporal_ms += watch.lap_ms();
 
   // Each candidate is registered on its own; who finishes first does not matter.
   if (std::any_of(opinions.begin(), opinions.end(), [](const Opinion& each) { return each.reason.empty(); }))
     query.geometry();
-  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+  tbb::parallel_for(std::size_t{0}, opinions.size(), [&](std::size_t i) {
     if (opinions[i].reason.empty()) register_it(query, opinions[i]);
   });
   return opinions;
 }
 
-// What speaks for a candidate besides: the most of it counts, not the sum.
-void LoopDetector::weigh_in(Opinion& opinion, double log_odds) const {
-  if (log_odds <= opinion.prior_log_odds) return;
-  opinion.prior_log_odds = log_odds;
-  judge(*opinion.geometric, log_odds, parameters_.geometric);
+// By its own evidence and what speaks for it besides.
+void LoopDetector::judge_with_context(Opinion& opinion) const {
+  judge(*opinion.geometric, opinion.followed_log_odds + opinion.ahead_log_odds, parameters_.geometric);
   opinion.reason = opinion.geometric->reason;
+}
+
+bool LoopDetector::are_elsewhere(const Opinion& a, const Opinion& b) const {
+  return std::abs(a.candidate.match.value - b.candidate.match.value) >
+         2 * std::int64_t{parameters_.retrieval.separation_frames};
+}
+
+const LoopDetector::Opinion* LoopDetector::likeliest(const std::vector<Opinion>& opinions) {
+  const Opinion* best = nullptr;
+  for (const Opinion& each : opinions)
+    if (each.geometric && (best == nullptr || each.geometric->log_odds > best->geometric->log_odds)) best = &each;
+  return best;
+}
+
+// Who is not sure is compared with the best candidate elsewhere, however little of that one overlaps.
+void LoopDetector::ask_runner_up(Query& query, const Opinion* unsure, std::vector<Opinion>& opinions,
+                                 const std::vector<Opinion>& others) const {
+  if (unsure == nullptr || !unsure->geometric) return;
+  const double log_odds = unsure->geometric->log_odds;
+  if (is_sure(log_odds) || !is_sure(log_odds + kMostAhead)) return;
+  std::optional<Opinion> rival;
+  for (const auto* all : {&std::as_const(opinions), &others})
+    for (const Opinion& each : *all) {
+      if (!are_elsewhere(each, *unsure)) continue;
+      if (each.geometric) return;  // there is one
+      if (!rival) rival = each;
+    }
+  if (!rival) return;
+  register_it(query, *rival);
+  opinions.push_back(*std::move(rival));
 }
 
 void LoopDetector::weigh_against_each_other(std::vector<Opinion>& opinions) const {
   // Where a scene shows little, even the right place fits poorly; that all others fit far worse speaks for it then.
   // Chosen on recordings that no reported figure uses (docs/accuracy.md).
-  constexpr double kNothingBelow = 8.0, kShare = 0.5, kMost = 5.0;
-  const std::int64_t elsewhere = 2 * std::int64_t{parameters_.retrieval.separation_frames};
+  constexpr double kNothingBelow = 8.0, kShare = 0.5;
   for (Opinion& each : opinions) {
     if (!each.geometric) continue;
     const double own = each.own_log_odds();
     std::optional<double> runner_up;
     for (const Opinion& other : opinions)
-      if (other.geometric && std::abs(other.candidate.match.value - each.candidate.match.value) > elsewhere)
+      if (other.geometric && are_elsewhere(other, each))
         runner_up = std::max(runner_up.value_or(-1e9), other.own_log_odds());
     if (!runner_up) continue;
-    const double says = std::clamp(kShare * (own - *runner_up - kNothingBelow), 0.0, kMost);
-    weigh_in(each, says);
+    const double ahead = std::clamp(kShare * (own - *runner_up - kNothingBelow), 0.0, kMostAhead);
+    if (ahead == each.ahead_log_odds) continue;
+    each.ahead_log_odds = ahead;
+    judge_with_context(each);
   }
 }
 
@@ -192,7 +234,8 @@ void LoopDetector::remember_loop(const std::optional<Station>& query, const Opin
 
 // Where another place is nearer to the query than the one that was found, asks that too. From far away little fits even
 // at the right place, and much is forgiven; what is much nearer must fit by itself, so that it decides.
-Status LoopDetector::go_nearer(Query& query, FrameId newest, std::vector<Opinion>& opinions, Opinion& answer) {
+Status LoopDetector::go_nearer(Query& query, FrameId newest, std::vector<Opinion>& opinions,
+                               const std::vector<Opinion>& others, Opinion& answer) {
   constexpr double kWorthIt_m = 0.3, kMuchNearer = 0.5;
   if (!parameters_.geometric.overhead_search || answer.distance_m() < kNear_m) return ok();
   const auto nearest = nearest_place(stations_, answer.candidate.match, answer.geometric->T_match_query, newest);
@@ -201,9 +244,11 @@ Status LoopDetector::go_nearer(Query& query, FrameId newest, std::vector<Opinion
   if (nearest_m + kWorthIt_m > answer.distance_m()) return ok();
   auto nearer = register_at(query, *nearest);
   if (!nearer) return nearer.error();
+  const std::size_t at = opinions.size();
   opinions.push_back(*std::move(nearer));
+  ask_runner_up(query, &opinions[at], opinions, others);
   weigh_against_each_other(opinions);
-  const Opinion& found = opinions.back();
+  const Opinion& found = opinions[at];
   const bool decides = nearest_m < kMuchNearer * answer.distance_m();
   if (decides || (found.reason.empty() && found.distance_m() < answer.distance_m())) answer = found;
   return ok();

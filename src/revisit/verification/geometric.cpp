@@ -67,8 +67,8 @@ void judge(GeometricEvidence& found, double prior_log_odds, const GeometricOptio
 }
 
 void refine(GeometricEvidence& found, const ScanGeometry& match, const ScanGeometry& query) {
-  // Sparse scans of foliage and of walls seen along single lines have normals that are off; a narrow kernel leaves them
-  // out, while patches are still looked for around.
+  // Foliage and corners have normals that are off; a narrow kernel leaves them out, while patches are still looked for
+  // around.
   constexpr double kMost_m = 0.15, kMost_rad = 0.02;
   const IcpResult icp = align_icp(match.surface(), query.surface().points(), found.T_match_query,
                                   {.coarse_m = 0.25, .fine_m = 0.05, .least_reach_m = 1.0, .settled_m = 1e-3});

@@ -43,7 +43,7 @@ GeometricEvidence check_geometric(const ScanGeometry& match, const ScanGeometry&
 /// Judges anew what was registered, with all that makes it likely besides (log odds).
 void judge(GeometricEvidence& found, double prior_log_odds, const GeometricOptions& options);
 
-/// Makes the pose of what was accepted as exact as the scans allow: a third of the error with 16 lines.
+/// Makes the pose of what was accepted as exact as the scans allow: a quarter of the error with 16 lines.
 void refine(GeometricEvidence& found, const ScanGeometry& match, const ScanGeometry& query);
 
 }  // namespace revisit

@@ -12,8 +12,8 @@ struct Coefficients {
 };
 
 // Learnt by scripts/learn_probability.py.
-constexpr Coefficients kWithIntensity{13.937, 1.930, 20.652, -35.808, 7.654, 5.215, 9.040, -37.472};
-constexpr Coefficients kWithoutIntensity{18.236, 1.977, 0.0, 0.0, 0.0, 6.359, 4.433, -22.517};
+constexpr Coefficients kWithIntensity{11.399, 2.656, 19.061, -53.284, 5.654, 2.631, 9.641, -32.688};
+constexpr Coefficients kWithoutIntensity{15.456, 2.557, 0.0, 0.0, 0.0, 4.993, 4.652, -22.246};
 constexpr double kFarthest_m = 12.0;  // beyond, nothing was learnt
 
 }  // namespace
