@@ -97,6 +97,26 @@ TEST(LoopDetector, AnUnsurePlaceIsComparedWithTheBestOneElsewhere) {
   EXPECT_EQ(compared.loop->match.value, 4);
 }
 
+TEST(LoopDetector, OfAFarAnswerAndAMuchNearerPlaceTheNearerOneDecides) {
+  const SyntheticWorld world(51);
+  const auto run = [&](bool fits_nearby) {
+    LoopDetector detector{Parameters{}};
+    for (int i = 0; i < 6; ++i) {
+      Scan place = scan_at(world, i, SyntheticWorld::at(i, 0, 0), static_cast<unsigned>(i));
+      if (i > 2 && !fits_nearby) place = blocked(std::move(place), 110.0);
+      EXPECT_TRUE(detector.add(std::move(place)));
+    }
+    return *detector.process(scan_at(world, 1000, SyntheticWorld::at(5.0, 0, 0), 104));
+  };
+  const Detection fits = run(true);
+  ASSERT_TRUE(fits.loop) << fits.reason;
+  EXPECT_EQ(fits.loop->match.value, 5);
+  const Detection does_not = run(false);
+  EXPECT_FALSE(does_not.loop) << "place " << does_not.loop->match.value;
+  ASSERT_TRUE(does_not.answer);
+  EXPECT_EQ(does_not.answer->match.value, 5);
+}
+
 TEST(LoopDetector, TheFirstPlaceCanBeRecognised) {
   const SyntheticWorld world(52);
   LoopDetector detector{Parameters{}};
