@@ -139,6 +139,44 @@ Result<Detection> LoopDetector::detect(const PreparedScan& prepared, const std::
   return detection;
 }
 
+Status LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
+  Stopwatch watch;
+  LoopVerification verification({.parameters = parameters_,
+                                 .index = index_,
+                                 .clouds = *clouds_,
+                                 .stations = stations_,
+                                 .track = track_,
+                                 .recent_queries = recent_queries_,
+                                 .usual_intensity_correlation = ego_motion_.usual_intensity_correlation(),
+                                 .newest = *detection.newest_searchable},
+                                prepared);
+  auto answer = verification.answer(detection.candidates);
+  if (!answer) return answer.error();
+  for (const Opinion& each : verification.opinions())
+    if (each.geometric) detection.registered.push_back({each.candidate.match, *each.geometric});
+  if (*answer) {
+    Opinion& best = **answer;
+    const std::optional<Station>& place = stations_.at(best.candidate.match);
+    if (best.reason.empty()) {
+      if (parameters_.geometric.follow && prepared.station && place && verification.is_sure(best.own_log_odds()))
+        track_.add(*prepared.station, best.candidate.match, *place, best.geometric->T_match_query, best.own_log_odds());
+      refine(*best.geometric, *best.geometry, verification.query_geometry());
+      const GeometricEvidence& found = *best.geometric;
+      detection.loop =
+          LoopConstraint{detection.frame,       best.candidate.match, found.T_match_query, found.evidence.inlier_ratio,
+                         found.evidence.rmse_m, found.probability,    found.information};
+    }
+    detection.answer = best.candidate;
+    detection.temporal = best.temporal;
+    detection.score = best.score();
+    detection.reason = best.reason;
+    detection.geometric = best.geometric;
+  }
+  detection.temporal_ms = verification.temporal_ms();
+  detection.geometric_ms = watch.lap_ms();
+  return ok();
+}
+
 Status LoopDetector::remember(PreparedScan prepared, const std::optional<Pose>& T_world_lidar) {
   const FrameId frame = prepared.scan.frame;
   if (const Status status = clouds_->put(frame, std::move(prepared.cloud)); !status) return status;

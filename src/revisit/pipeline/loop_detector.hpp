@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <deque>
 #include <map>
 #include <optional>
 #include <string>
@@ -10,12 +9,10 @@
 #include <revisit/core/results.hpp>
 #include <revisit/pipeline/ego_motion.hpp>
 #include <revisit/pipeline/loop_track.hpp>
+#include <revisit/pipeline/loop_verification.hpp>
 #include <revisit/pipeline/place_clouds.hpp>
 #include <revisit/pipeline/prepare.hpp>
-#include <revisit/registration/overhead_search.hpp>
 #include <revisit/retrieval/place_index.hpp>
-#include <revisit/verification/geometric.hpp>
-#include <revisit/verification/temporal.hpp>
 
 namespace revisit {
 
@@ -31,7 +28,7 @@ struct Detection {
     FrameId match;
     GeometricEvidence evidence;
   };
-  std::vector<Registered> registered;             ///< every candidate that was registered, accepted or not
+  std::vector<Registered> registered;             ///< every place that was registered, accepted or not
   std::optional<LoopConstraint> loop;             ///< set where the answer was accepted
   double score = 0.0;                             ///< confidence that orders answers (docs/method.md, section 7)
   std::string reason;                             ///< why there is no loop; empty where there is one
@@ -89,55 +86,7 @@ class LoopDetector {
   // The next scan of the recording: its distortion is undone, and the motion learnt from it.
   Result<PreparedScan> prepare_next(Scan scan);
   EgoMotion::Step find_motion(PreparedScan& prepared) const;
-  // A scan that is asked about, made ready as far as somebody needs it.
-  struct Query {
-    explicit Query(const PreparedScan& of) : scan(of), overhead(of.cloud), geometry_(of.geometry) {}
-    const ScanGeometry& geometry();
-
-    const PreparedScan& scan;
-    OverheadSearch overhead;
-
-   private:
-    std::shared_ptr<const ScanGeometry> geometry_;
-  };
-  // What is found out about a candidate, step by step; `reason` says why it is no loop.
-  struct Opinion {
-    explicit Opinion(const LoopCandidate& of) : candidate(of), T_guess_match_query(planar_pose(0, 0, of.yaw_rad)) {}
-    double score() const;
-    double own_log_odds() const { return loop_log_odds(geometric->evidence); }
-    double distance_m() const { return geometric->T_match_query.translation().norm(); }
-
-    LoopCandidate candidate;
-    std::shared_ptr<const ThinCloud> place;
-    Pose T_guess_match_query;
-    double overlap = 0.0;  ///< seen from overhead
-    TemporalEvidence temporal;
-    std::shared_ptr<const ScanGeometry> geometry;  ///< of the place, where it was registered
-    std::optional<GeometricEvidence> geometric;
-    // What speaks for it besides its own evidence: that the sensor's way leads there, that all others fit worse.
-    double followed_log_odds = 0.0, ahead_log_odds = 0.0;
-    std::string reason;
-  };
-
   Status verify(Detection& detection, const PreparedScan& prepared);
-  // Registers the query on a place that it is known to stand near to: only the pose is open.
-  Result<Opinion> register_at(Query& query, const LoopTrack::Expectation& where);
-  Result<std::vector<Opinion>> look_at_candidates(Query& query, const Detection& detection) const;
-  std::vector<Opinion> ask_best(Query& query, std::vector<Opinion>& candidates, Detection& detection) const;
-  void register_it(Query& query, Opinion& opinion) const;
-  void judge_with_context(Opinion& opinion) const;
-  bool are_elsewhere(const Opinion& a, const Opinion& b) const;
-  static const Opinion* likeliest(const std::vector<Opinion>& opinions);
-  void ask_runner_up(Query& query, const Opinion* unsure, std::vector<Opinion>& opinions,
-                     const std::vector<Opinion>& others) const;
-  // A candidate that fits far better than those elsewhere is the likelier for it: ambiguity against the runner-up.
-  void weigh_against_each_other(std::vector<Opinion>& opinions) const;
-  bool is_sure(double log_odds) const;
-  void remember_loop(const std::optional<Station>& query, const Opinion& found);
-  Status go_nearer(Query& query, FrameId newest, std::vector<Opinion>& opinions, const std::vector<Opinion>& others,
-                   Opinion& answer);
-  void look_from_overhead(OverheadSearch& overhead, double yaw_reach_rad, Opinion& opinion) const;
-  void check_temporal_and_scores(FrameId frame, Opinion& opinion) const;
 
   Parameters parameters_;
   std::optional<IntensityScale> scale_;
@@ -150,7 +99,7 @@ class LoopDetector {
   std::unique_ptr<PlaceClouds> clouds_;
   EgoMotion ego_motion_;
   LoopTrack track_;
-  std::deque<std::pair<FrameId, IntensityScanContext>> recent_queries_;  ///< the last N, for temporal consistency
+  LoopVerification::RecentQueries recent_queries_;  ///< the last N
 };
 
 }  // namespace revisit

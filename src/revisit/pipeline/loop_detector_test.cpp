@@ -88,7 +88,9 @@ TEST(LoopDetector, AnUnsurePlaceIsComparedWithTheBestOneElsewhere) {
     LoopDetector detector{Parameters{}};
     for (int i = 0; i < 8; ++i)
       EXPECT_TRUE(detector.add(scan_at(world, i, SyntheticWorld::at(-4.0 + i, 0, 0), static_cast<unsigned>(i))));
-    if (knows_another) EXPECT_TRUE(detector.add(scan_at(away, 100, SyntheticWorld::at(0, 0, 0), 20)));
+    if (knows_another) {
+      EXPECT_TRUE(detector.add(scan_at(away, 100, SyntheticWorld::at(0, 0, 0), 20)));
+    }
     return *detector.process(query);
   };
   EXPECT_FALSE(run(false).loop) << "nobody to compare with";

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <iterator>
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <revisit/descriptors/similarity.hpp>
+#include <revisit/pipeline/loop_verification.hpp>
+
+namespace revisit {
+namespace {
+
+template <typename... Values>
+std::string format(const char* pattern, Values... values) {
+  char text[96];
+  std::snprintf(text, sizeof text, pattern, values...);
+  return text;
+}
+
+}  // namespace
+
+double Opinion::score() const {
+  // Registration knows best, then the view from overhead, then the descriptors. Flattened, so that no two sure ones
+  // are equal.
+  constexpr double kFlat = 6.0;
+  const double registered = geometric ? 1.0 / (1.0 + std::exp(-own_log_odds() / kFlat)) : 0.0;
+  const double evidence = candidate.geometry_score / 4.0 + overlap / 4.0 + registered;
+  if (!geometric) return evidence;
+  // A loop over more than this is a right constraint, but not the same place (docs/evaluation.md).
+  // Poses have errors: close to the limit it is open which of the two it is.
+  constexpr double kSamePlace_m = 4.0, kOpen_m = 0.5, kRefused = 0.2;
+  const double same_place = std::clamp((kSamePlace_m - distance_m()) / kOpen_m, 0.0, 1.0);
+  return reason.empty() ? evidence + 1.0 + same_place : evidence + kRefused * same_place;
+}
+
+// All candidates, those first that look best from overhead.
+Status LoopVerification::look_at(std::span<const LoopCandidate> candidates) {
+  for (const LoopCandidate& candidate : candidates) {
+    auto place = known_.clouds.get(candidate.match);
+    if (!place) return place.error();
+    candidates_.emplace_back(candidate).place = *std::move(place);
+  }
+  if (!options_.overhead_search) return ok();
+  // Half a sector of the descriptor and a little more.
+  const double yaw_reach_rad = kPi / known_.parameters.descriptor.sectors + to_radians(3.0);
+  for (Opinion& each : candidates_) look_from_overhead(yaw_reach_rad, each);
+  std::stable_sort(candidates_.begin(), candidates_.end(),
+                   [](const Opinion& a, const Opinion& b) { return a.overlap > b.overlap; });
+  return ok();
+}
+
+// Registers the first of the candidates.
+void LoopVerification::ask_best() {
+  const auto count = std::min(candidates_.size(), static_cast<std::size_t>(options_.candidates));
+  const auto rest = candidates_.begin() + static_cast<std::ptrdiff_t>(count);
+  opinions_.assign(std::make_move_iterator(candidates_.begin()), std::make_move_iterator(rest));
+  candidates_.erase(candidates_.begin(), rest);
+  Stopwatch watch;
+  for (Opinion& each : opinions_) check_temporal_and_scores(each);
+  temporal_ms_ += watch.lap_ms();
+
+  // Each candidate is registered on its own; who finishes first does not matter.
+  if (std::any_of(opinions_.begin(), opinions_.end(), [](const Opinion& each) { return each.reason.empty(); }))
+    query_geometry();
+  tbb::parallel_for(std::size_t{0}, opinions_.size(), [&](std::size_t i) {
+    if (opinions_[i].reason.empty()) register_it(opinions_[i]);
+  });
+}
+
+// Registers the query on a place that it is known to stand near to: only the pose is open.
+Result<Opinion> LoopVerification::register_at(const LoopTrack::Expectation& where) {
+  LoopCandidate candidate;
+  if (const auto descriptor = known_.index.find(where.match))
+    candidate = match_descriptors(query_.descriptor, *descriptor);
+  candidate.match = where.match;
+  candidate.yaw_rad = yaw_of(where.T_match_query);
+  auto place = known_.clouds.get(where.match);
+  if (!place) return place.error();
+  Opinion opinion(candidate);
+  opinion.place = *std::move(place);
+  look_from_overhead(to_radians(3.0), opinion);
+  opinion.T_guess_match_query = where.T_match_query;
+  opinion.reason.clear();  // however little overlaps: something stands in the way, not elsewhere
+  check_temporal_and_scores(opinion);
+  if (opinion.reason.empty()) register_it(opinion);
+  return opinion;
+}
+
+void LoopVerification::register_it(Opinion& opinion) {
+  opinion.geometry = std::make_shared<ScanGeometry>(*opinion.place);
+  CandidateView view{opinion.T_guess_match_query, opinion.overlap};
+  if (const auto usual = known_.usual_intensity_correlation) view.usual_intensity_correlation = *usual;
+  opinion.geometric = check_geometric(*opinion.geometry, query_geometry(), view, options_);
+  opinion.followed_log_odds = known_.track.in_favour(query_.station, known_.stations.at(opinion.candidate.match),
+                                                     opinion.geometric->T_match_query);
+  judge_with_context(opinion);
+}
+
+// By its own evidence and what speaks for it besides.
+void LoopVerification::judge_with_context(Opinion& opinion) const {
+  judge(*opinion.geometric, opinion.followed_log_odds + opinion.ahead_log_odds, options_);
+  opinion.reason = opinion.geometric->reason;
+}
+
+void LoopVerification::look_from_overhead(double yaw_reach_rad, Opinion& opinion) {
+  const OverheadMatch found =
+      overhead_.search(*opinion.place, opinion.candidate.yaw_rad, yaw_reach_rad, kOverheadReach_m);
+  opinion.T_guess_match_query = planar_pose(found.x_m, found.y_m, found.yaw_rad);
+  opinion.overlap = found.overlap;
+  if (found.overlap < options_.min_overlap)
+    opinion.reason = format("overlap from overhead %.2f below %.2f", found.overlap, options_.min_overlap);
+}
+
+void LoopVerification::check_temporal_and_scores(Opinion& opinion) const {
+  const auto query_descriptor = [&](FrameId of) -> std::optional<DescriptorView> {
+    const auto found = std::find_if(known_.recent_queries.begin(), known_.recent_queries.end(),
+                                    [&](const auto& each) { return each.first == of; });
+    if (found == known_.recent_queries.end()) return std::nullopt;
+    return found->second;
+  };
+  const auto match_descriptor = [&](FrameId of) { return known_.index.find(of); };
+  opinion.temporal = check_temporal(query_.scan.frame, opinion.candidate.match, query_descriptor, match_descriptor,
+                                    known_.parameters.temporal);
+  if (!opinion.reason.empty()) return;
+  if (opinion.candidate.score() < options_.min_descriptor_score)
+    opinion.reason =
+        format("descriptor score %.3f below %.3f", opinion.candidate.score(), options_.min_descriptor_score);
+  else if (!opinion.temporal.consistent)
+    opinion.reason = opinion.temporal.reason;
+}
+
+}  // namespace revisit
