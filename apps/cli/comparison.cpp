@@ -5,6 +5,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include <revisit/core/text.hpp>
+
 #include "evaluation_pictures.hpp"
 #include "table.hpp"
 

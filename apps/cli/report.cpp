@@ -3,6 +3,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include <revisit/core/text.hpp>
+
 #include "table.hpp"
 
 namespace revisit::cli {

@@ -2,8 +2,6 @@
 #include "table.hpp"
 
 #include <algorithm>
-#include <cstdarg>
-#include <cstdio>
 
 namespace revisit::cli {
 
@@ -35,15 +33,6 @@ std::string to_html(const Table& table) {
     html += "</tr>\n";
   }
   return html + "</table>\n";
-}
-
-std::string format(const char* pattern, ...) {
-  char text[256];
-  std::va_list values;
-  va_start(values, pattern);
-  std::vsnprintf(text, sizeof text, pattern, values);
-  va_end(values);
-  return text;
 }
 
 }  // namespace revisit::cli

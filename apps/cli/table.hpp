@@ -13,7 +13,4 @@ std::string to_text(const Table& table);  ///< columns to the right, each as wid
 std::string to_html(const Table& table);
 std::string html_escape(const std::string& text);
 
-/// As printf, up to 255 characters.
-std::string format(const char* pattern, ...) __attribute__((format(printf, 1, 2)));
-
 }  // namespace revisit::cli

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include <revisit/core/text.hpp>
+
 #include "chart.hpp"
 #include "map_picture.hpp"
 #include "table.hpp"

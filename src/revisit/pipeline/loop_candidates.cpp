@@ -1,25 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <iterator>
 
 #include <oneapi/tbb/parallel_for.h>
 
+#include <revisit/core/text.hpp>
 #include <revisit/descriptors/similarity.hpp>
 #include <revisit/pipeline/loop_verification.hpp>
 
 namespace revisit {
-namespace {
-
-template <typename... Values>
-std::string format(const char* pattern, Values... values) {
-  char text[96];
-  std::snprintf(text, sizeof text, pattern, values...);
-  return text;
-}
-
-}  // namespace
 
 double Opinion::score() const {
   // Registration knows best, then the view from overhead, then the descriptors. Flattened, so that no two sure ones

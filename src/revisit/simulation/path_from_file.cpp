@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include <revisit/core/pose.hpp>
+#include <revisit/core/text.hpp>
 #include <revisit/io/pose_file.hpp>
 #include <revisit/simulation/internal/path.hpp>
 
@@ -58,20 +59,17 @@ Status check(const std::filesystem::path& file, const std::vector<Stop>& stops, 
   for (std::size_t i = 1; i < stops.size(); ++i) {
     const double step_m = (stops[i].position - stops[i - 1].position).norm(),
                  gap_s = stops[i].time_s - stops[i - 1].time_s;
-    char text[160];
     if (!(gap_s > 0.0)) return problem(file, i, "its time does not increase");
     if (format == PoseFormat::kKitti && gap_s > 1.5 * Path::kStep_s)
       return problem(file, i, "frames before it have no pose (rows of NaN?); every frame needs one");
-    if (gap_s > kLongestGap_s) {
-      std::snprintf(text, sizeof text, "%.1f s after the one before; allowed: up to %.1f s", gap_s, kLongestGap_s);
-      return problem(file, i, text);
-    }
+    if (gap_s > kLongestGap_s)
+      return problem(file, i,
+                     revisit::format("%.1f s after the one before; allowed: up to %.1f s", gap_s, kLongestGap_s));
     const double allowed_m =
         format == PoseFormat::kTum ? kHighestSpeed_mps * gap_s : kLongestStep_m * gap_s / Path::kStep_s;
-    if (step_m > allowed_m) {
-      std::snprintf(text, sizeof text, "a jump of %.1f m in %.2f s; allowed: up to %.1f m", step_m, gap_s, allowed_m);
-      return problem(file, i, text);
-    }
+    if (step_m > allowed_m)
+      return problem(file, i,
+                     revisit::format("a jump of %.1f m in %.2f s; allowed: up to %.1f m", step_m, gap_s, allowed_m));
     low = low.cwiseMin(stops[i].position);
     high = high.cwiseMax(stops[i].position);
   }

@@ -1,21 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/verification/geometric.hpp>
 
-#include <cstdio>
 #include <optional>
 
+#include <revisit/core/text.hpp>
 #include <revisit/registration/feature_alignment.hpp>
 #include <revisit/registration/icp.hpp>
 
 namespace revisit {
 namespace {
-
-template <typename... Values>
-std::string format(const char* pattern, Values... values) {
-  char text[160];
-  std::snprintf(text, sizeof text, pattern, values...);
-  return text;
-}
 
 std::string reason_to_refuse(const GeometricEvidence& found, const GeometricOptions& options) {
   const LoopEvidence& evidence = found.evidence;

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/verification/temporal.hpp>
 
-#include <cstdio>
-
+#include <revisit/core/text.hpp>
 #include <revisit/descriptors/similarity.hpp>
 
 namespace revisit {
@@ -41,10 +40,8 @@ TemporalEvidence check_temporal(FrameId query, FrameId match, const DescriptorLo
   evidence.reverse = evidence.reverse_score > evidence.forward_score;
   evidence.score = evidence.reverse ? evidence.reverse_score : evidence.forward_score;
   if (forward.pairs + reverse.pairs > 0 && evidence.score < options.min_score) {
-    char text[96];
-    std::snprintf(text, sizeof text, "temporal consistency %.3f below %.3f", evidence.score, options.min_score);
     evidence.consistent = false;
-    evidence.reason = text;
+    evidence.reason = format("temporal consistency %.3f below %.3f", evidence.score, options.min_score);
   }
   return evidence;
 }
