@@ -15,7 +15,7 @@ import numpy as np
 
 RIGHT_M, RIGHT_DEG = 0.5, 3.0  # docs/evaluation.md
 WRONG_M, WRONG_DEG = 2.0, 10.0  # in between, the place is right and the pose poor: nothing is learnt from it
-NAMES = ["inlier_ratio", "free_space", "intensity", "rmse_m", "overlap", "distance", "distance_root", "constant"]
+NAMES = ["inlier_share", "free_space", "intensity", "rmse_m", "overlap", "distance", "distance_root", "constant"]
 WITHOUT_INTENSITY = [0, 1, 5, 6]
 
 
@@ -45,7 +45,7 @@ def load(folder):
             is_right = off_m <= RIGHT_M and angle <= RIGHT_DEG
             if not is_right and off_m < WRONG_M and angle < WRONG_DEG:
                 continue
-            X.append([inliers, -np.log(1.004 - free), float(row["intensity_agreement"]), float(row["rmse_m"]),
+            X.append([float(row["inlier_share"]), -np.log(1.004 - free), float(row["intensity_agreement"]), float(row["rmse_m"]),
                       float(row["overlap"]), distance, distance**0.5])
             right.append(is_right)
             queries.append(int(row["query"]))

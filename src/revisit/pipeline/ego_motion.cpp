@@ -31,19 +31,32 @@ EgoMotion::Step EgoMotion::find(double stamp_s, std::shared_ptr<const ScanGeomet
   step.surprise_m = off.translation().norm() + kArm_m * rotation_angle(off);
   step.T_last_scan = icp.T_target_source;
   step.motion = twist_of(icp.T_target_source, gap_s);
-  step.intensity_correlation = agreement.intensity_correlation;
+  step.agreement = agreement;
   return step;
 }
 
 void EgoMotion::learn(Step step) {
   // Of scans from the same spot, intensities would agree too well.
   constexpr double kStill_m = 0.05;
-  if (step.intensity_correlation && step.T_last_scan->translation().norm() > kStill_m)
-    learn_intensities(*step.intensity_correlation);
+  if (step.agreement) {
+    if (step.agreement->intensity_correlation && step.T_last_scan->translation().norm() > kStill_m)
+      learn_intensities(*step.agreement->intensity_correlation);
+    learn_inliers(step.agreement->inlier_ratio);
+  } else {
+    inlier_ratio_lately_.reset();
+  }
   station_ = step.T_last_scan ? station_.after(*step.T_last_scan) : Station{.piece = station_.piece + 1};
   motion_ = step.motion;
   last_ = std::move(step.scan);
   last_stamp_s_ = step.stamp_s;
+}
+
+void EgoMotion::learn_inliers(double ratio) {
+  constexpr double kNewShare = 0.3;  // of the last scan in the running mean
+  inlier_ratio_lately_ =
+      inlier_ratio_lately_ ? *inlier_ratio_lately_ + kNewShare * (ratio - *inlier_ratio_lately_) : ratio;
+  inlier_ratio_sum_ += ratio;
+  ++steps_;
 }
 
 void EgoMotion::learn_intensities(double correlation) {
@@ -52,13 +65,16 @@ void EgoMotion::learn_intensities(double correlation) {
   ++pairs_;
 }
 
-std::optional<double> EgoMotion::usual_intensity_correlation() const {
-  if (pairs_ < kFewestPairs) return std::nullopt;
+UsualAgreement EgoMotion::usual() const {
+  UsualAgreement usual;
+  if (steps_ >= kFewestPairs) usual.inlier_ratio = inlier_ratio_sum_ / static_cast<double>(steps_);
+  if (pairs_ < kFewestPairs) return usual;
   std::size_t bin = 0, below = correlations_[0];
   while (2 * below < pairs_) below += correlations_[++bin];
   // Intensities that agree badly even here tell nothing elsewhere.
   constexpr double kLeast = 0.1;
-  return std::max(kLeast, static_cast<double>(bin) / kLastBin);
+  usual.intensity_correlation = std::max(kLeast, static_cast<double>(bin) / kLastBin);
+  return usual;
 }
 
 }  // namespace revisit

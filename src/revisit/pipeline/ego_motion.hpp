@@ -10,6 +10,8 @@
 #include <revisit/core/twist.hpp>
 #include <revisit/pipeline/loop_track.hpp>
 #include <revisit/registration/feature_alignment.hpp>
+#include <revisit/registration/icp.hpp>
+#include <revisit/verification/geometric.hpp>
 
 namespace revisit {
 
@@ -27,7 +29,7 @@ class EgoMotion {
     std::optional<Twist> motion;      ///< that it means
     /// How far from where it was expected that puts points 20 m away: then its distortion was not undone rightly.
     double surprise_m = 0.0;
-    std::optional<double> intensity_correlation;
+    std::optional<Agreement> agreement;
   };
   /// Of a scan that was undistorted with what expected() said, or with what was found so.
   Step find(double stamp_s, std::shared_ptr<const ScanGeometry> scan) const;
@@ -37,13 +39,16 @@ class EgoMotion {
   /// Where the last scan was taken; another piece than the scan before where the motion between was not found.
   const Station& station() const { return station_; }
 
-  /// The median correlation of intensities between consecutive scans of a moving sensor, once it is known from
-  /// enough of them.
-  std::optional<double> usual_intensity_correlation() const;
+  /// How well scans agree with the one before them, once it is known from enough of them: the median of intensities of
+  /// a moving sensor, the mean of inliers.
+  UsualAgreement usual() const;
+  /// The running mean over the last few; none where the last scan was not found.
+  std::optional<double> inlier_ratio_lately() const { return inlier_ratio_lately_; }
   bool knows_intensities() const { return pairs_ >= kPairsThatTell; }
 
  private:
   void learn_intensities(double correlation);
+  void learn_inliers(double ratio);
   static constexpr double kLongestGap_s = 0.5;
   std::shared_ptr<const ScanGeometry> last_;
   double last_stamp_s_ = 0.0;
@@ -53,6 +58,9 @@ class EgoMotion {
   static constexpr int kLastBin = 100;
   std::array<std::uint32_t, kLastBin + 1> correlations_{};  ///< histogram over [0, 1]
   std::size_t pairs_ = 0;
+  std::optional<double> inlier_ratio_lately_;
+  double inlier_ratio_sum_ = 0.0;
+  std::size_t steps_ = 0;
 };
 
 }  // namespace revisit

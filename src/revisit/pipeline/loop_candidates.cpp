@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include <oneapi/tbb/parallel_for.h>
 
@@ -25,28 +24,26 @@ double Opinion::score() const {
   return reason.empty() ? evidence + 1.0 + same_place : evidence + kRefused * same_place;
 }
 
-// All candidates, those first that look best from overhead.
+// The candidates that look best from overhead.
 Status LoopVerification::look_at(std::span<const LoopCandidate> candidates) {
   for (const LoopCandidate& candidate : candidates) {
     auto place = known_.clouds.get(candidate.match);
     if (!place) return place.error();
-    candidates_.emplace_back(candidate).place = *std::move(place);
+    opinions_.emplace_back(candidate).place = *std::move(place);
   }
-  if (!options_.overhead_search) return ok();
-  // Half a sector of the descriptor and a little more.
-  const double yaw_reach_rad = kPi / known_.parameters.descriptor.sectors + to_radians(3.0);
-  for (Opinion& each : candidates_) look_from_overhead(yaw_reach_rad, each);
-  std::stable_sort(candidates_.begin(), candidates_.end(),
-                   [](const Opinion& a, const Opinion& b) { return a.overlap > b.overlap; });
+  if (options_.overhead_search) {
+    // Half a sector of the descriptor and a little more.
+    const double yaw_reach_rad = kPi / known_.parameters.descriptor.sectors + to_radians(3.0);
+    for (Opinion& each : opinions_) look_from_overhead(yaw_reach_rad, each);
+    std::stable_sort(opinions_.begin(), opinions_.end(),
+                     [](const Opinion& a, const Opinion& b) { return a.overlap > b.overlap; });
+  }
+  const auto count = std::min(opinions_.size(), static_cast<std::size_t>(options_.candidates));
+  opinions_.erase(opinions_.begin() + static_cast<std::ptrdiff_t>(count), opinions_.end());
   return ok();
 }
 
-// Registers the first of the candidates.
-void LoopVerification::ask_best() {
-  const auto count = std::min(candidates_.size(), static_cast<std::size_t>(options_.candidates));
-  const auto rest = candidates_.begin() + static_cast<std::ptrdiff_t>(count);
-  opinions_.assign(std::make_move_iterator(candidates_.begin()), std::make_move_iterator(rest));
-  candidates_.erase(candidates_.begin(), rest);
+void LoopVerification::ask_them() {
   Stopwatch watch;
   for (Opinion& each : opinions_) check_temporal_and_scores(each);
   temporal_ms_ += watch.lap_ms();
@@ -80,17 +77,13 @@ Result<Opinion> LoopVerification::register_at(const LoopTrack::Expectation& wher
 
 void LoopVerification::register_it(Opinion& opinion) {
   opinion.geometry = std::make_shared<ScanGeometry>(*opinion.place);
-  CandidateView view{opinion.T_guess_match_query, opinion.overlap};
-  if (const auto usual = known_.usual_intensity_correlation) view.usual_intensity_correlation = *usual;
+  const CandidateView view{opinion.T_guess_match_query, opinion.overlap, known_.usual};
   opinion.geometric = check_geometric(*opinion.geometry, query_geometry(), view, options_);
-  opinion.followed_log_odds = known_.track.in_favour(query_.station, known_.stations.at(opinion.candidate.match),
-                                                     opinion.geometric->T_match_query);
-  judge_with_context(opinion);
-}
-
-// By its own evidence and what speaks for it besides.
-void LoopVerification::judge_with_context(Opinion& opinion) const {
-  judge(*opinion.geometric, opinion.followed_log_odds + opinion.ahead_log_odds, options_);
+  // By its own evidence, and by the way of the sensor.
+  judge(*opinion.geometric,
+        known_.track.in_favour(query_.station, known_.stations.at(opinion.candidate.match),
+                               opinion.geometric->T_match_query),
+        options_);
   opinion.reason = opinion.geometric->reason;
 }
 

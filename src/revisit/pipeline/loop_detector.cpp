@@ -67,6 +67,7 @@ Result<PreparedScan> LoopDetector::prepare_next(Scan scan) {
     }
   ego_motion_.learn(std::move(step));
   prepared->station = ego_motion_.station();
+  prepared->usual_inlier_ratio = ego_motion_.inlier_ratio_lately();
   return prepared;
 }
 
@@ -141,13 +142,15 @@ Result<Detection> LoopDetector::detect(const PreparedScan& prepared, const std::
 
 Status LoopDetector::verify(Detection& detection, const PreparedScan& prepared) {
   Stopwatch watch;
+  UsualAgreement usual = ego_motion_.usual();
+  usual.inlier_ratio = prepared.usual_inlier_ratio.value_or(usual.inlier_ratio);
   LoopVerification verification({.parameters = parameters_,
                                  .index = index_,
                                  .clouds = *clouds_,
                                  .stations = stations_,
                                  .track = track_,
                                  .recent_queries = recent_queries_,
-                                 .usual_intensity_correlation = ego_motion_.usual_intensity_correlation(),
+                                 .usual = usual,
                                  .newest = *detection.newest_searchable},
                                 prepared);
   auto answer = verification.answer(detection.candidates);

@@ -81,24 +81,6 @@ TEST(LoopDetector, ALoopIsFollowedPastWhatStandsInTheWay) {
   EXPECT_FALSE(run(false, 0).loop) << "nor where loops are not followed";
 }
 
-TEST(LoopDetector, AnUnsurePlaceIsComparedWithTheBestOneElsewhere) {
-  const SyntheticWorld world(51), away(54);
-  const auto query = blocked(scan_at(world, 1000, SyntheticWorld::at(0, 0, 0), 104), 110.0);
-  const auto run = [&](bool knows_another) {
-    LoopDetector detector{Parameters{}};
-    for (int i = 0; i < 8; ++i)
-      EXPECT_TRUE(detector.add(scan_at(world, i, SyntheticWorld::at(-4.0 + i, 0, 0), static_cast<unsigned>(i))));
-    if (knows_another) {
-      EXPECT_TRUE(detector.add(scan_at(away, 100, SyntheticWorld::at(0, 0, 0), 20)));
-    }
-    return *detector.process(query);
-  };
-  EXPECT_FALSE(run(false).loop) << "nobody to compare with";
-  const Detection compared = run(true);
-  ASSERT_TRUE(compared.loop) << compared.reason;
-  EXPECT_EQ(compared.loop->match.value, 4);
-}
-
 TEST(LoopDetector, OfAFarAnswerAndAMuchNearerPlaceTheNearerOneDecides) {
   const SyntheticWorld world(51);
   const auto run = [&](bool fits_nearby) {
@@ -117,6 +99,23 @@ TEST(LoopDetector, OfAFarAnswerAndAMuchNearerPlaceTheNearerOneDecides) {
   EXPECT_FALSE(does_not.loop) << "place " << does_not.loop->match.value;
   ASSERT_TRUE(does_not.answer);
   EXPECT_EQ(does_not.answer->match.value, 5);
+}
+
+TEST(LoopDetector, InliersAreComparedWithThoseOfTheScansBefore) {
+  const SyntheticWorld world(51);
+  LoopDetector detector{Parameters{}};
+  for (int i = 0; i < 4; ++i)
+    ASSERT_TRUE(detector.add(scan_at(world, i, SyntheticWorld::at(i, 0, 0), static_cast<unsigned>(i))));
+  const auto share = [&](const Detection& detection) {
+    return detection.geometric->evidence.inlier_ratio / detection.geometric->evidence.inlier_share;
+  };
+  // 100 s later nothing is known of the last few; then half of each scan is hidden from the one before.
+  const auto alone = detector.process(scan_at(world, 1000, SyntheticWorld::at(0, 0, 0), 10));
+  ASSERT_TRUE(alone && alone->geometric);
+  Scan half = blocked(scan_at(world, 1001, SyntheticWorld::at(0, 0, 0), 11), 150.0);
+  const auto poor = detector.process(half);
+  ASSERT_TRUE(poor && poor->geometric);
+  EXPECT_LT(share(*poor), share(*alone) - 0.1);
 }
 
 TEST(LoopDetector, TheFirstPlaceCanBeRecognised) {

@@ -35,8 +35,6 @@ struct Opinion {
   TemporalEvidence temporal;
   std::shared_ptr<const ScanGeometry> geometry;  ///< of the place, where it was registered
   std::optional<GeometricEvidence> geometric;
-  /// What speaks for it besides its own evidence: that the sensor's way leads there, that all others fit worse.
-  double followed_log_odds = 0.0, ahead_log_odds = 0.0;
   std::string reason;  ///< why it is no loop; empty where it is one
 };
 
@@ -53,7 +51,7 @@ class LoopVerification {
     const LoopTrack::Places& stations;
     const LoopTrack& track;
     const RecentQueries& recent_queries;
-    std::optional<double> usual_intensity_correlation;
+    UsualAgreement usual;
     FrameId newest;  ///< that the scan may be matched with
   };
   LoopVerification(const Known& known, const PreparedScan& query);
@@ -69,17 +67,13 @@ class LoopVerification {
  private:
   // loop_candidates.cpp: how a candidate is asked.
   Status look_at(std::span<const LoopCandidate> candidates);
-  void ask_best();
+  void ask_them();
   Result<Opinion> register_at(const LoopTrack::Expectation& where);
   void register_it(Opinion& opinion);
-  void judge_with_context(Opinion& opinion) const;
   void look_from_overhead(double yaw_reach_rad, Opinion& opinion);
   void check_temporal_and_scores(Opinion& opinion) const;
   // loop_verification.cpp: who is asked, and what follows.
   Result<std::optional<Opinion>> expected();
-  bool are_elsewhere(const Opinion& a, const Opinion& b) const;
-  void ask_runner_up(std::size_t unsure);
-  void weigh_against_each_other();
   Status go_nearer(Opinion& answer);
 
   static constexpr int kOverheadReach_m = 6;  ///< a translation that retrieval may be off
@@ -88,8 +82,7 @@ class LoopVerification {
   const PreparedScan& query_;
   OverheadSearch overhead_;
   std::shared_ptr<const ScanGeometry> query_geometry_;
-  std::vector<Opinion> opinions_;    ///< of those that were asked
-  std::vector<Opinion> candidates_;  ///< that nobody asked yet, those first that look best from overhead
+  std::vector<Opinion> opinions_;  ///< of those that were asked
   double temporal_ms_ = 0.0;
 };
 

@@ -29,6 +29,8 @@ struct PreparedScan {
   ThinCloud cloud;                               ///< for registration; the ground is kept and marked
   std::shared_ptr<const ScanGeometry> geometry;  ///< of the cloud, where somebody has asked for it already
   std::optional<Station> station;                ///< where it was taken along the sensor's way, where that is known
+  /// How much of the last few scans fitted the one before each, where that is known.
+  std::optional<double> usual_inlier_ratio;
 
   struct Milliseconds {
     double filter = 0.0, ground = 0.0, intensity = 0.0, describe = 0.0, thin = 0.0;

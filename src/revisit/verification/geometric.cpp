@@ -39,9 +39,10 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
   evidence.information = icp.information;
   LoopEvidence& all = evidence.evidence;
   all.inlier_ratio = agreement.inlier_ratio;
+  all.inlier_share = agreement.inlier_ratio / view.usual.inlier_ratio;
   all.free_space_agreement = agreement.free_space_agreement;
   if (agreement.intensity_correlation)
-    all.intensity_agreement = *agreement.intensity_correlation / view.usual_intensity_correlation;
+    all.intensity_agreement = *agreement.intensity_correlation / view.usual.intensity_correlation;
   all.rmse_m = agreement.rmse_m;
   all.overlap = view.overlap;
   all.distance_m = icp.T_target_source.translation().norm();

@@ -25,13 +25,18 @@ struct GeometricEvidence {
   std::string reason;  ///< why not consistent
 };
 
+/// What consecutive scans of this sensor show of each other: it hardly gets better than that.
+struct UsualAgreement {
+  double inlier_ratio = 0.9;
+  double intensity_correlation = 0.95;
+};
+
 /// What is known of a candidate before it is registered.
 struct CandidateView {
   /// The yaw that the descriptors agreed on, or the overhead search's pose.
   Pose T_guess_match_query = Pose::Identity();
   double overlap = 0.8;  ///< of both scans seen from overhead; as usual, where nobody looked
-  /// The correlation of intensities that consecutive scans show with this sensor.
-  double usual_intensity_correlation = 0.95;
+  UsualAgreement usual = {};
 };
 
 /// Geometric consistency (paper, section III-D): registers the query onto the match by ICP, from the guess; with

@@ -28,6 +28,17 @@ TEST(GeometricConsistency, ARevisitGivesItsPose) {
   EXPECT_FALSE(evidence.from_features) << "the descriptor's yaw was good enough";
 }
 
+TEST(GeometricConsistency, InliersCountAsAShareOfWhatIsUsualThere) {
+  ScanGeometry match = scan_at(31, SyntheticWorld::at(0, 0, 0)), query = scan_at(31, SyntheticWorld::at(2, 1, 0.0));
+  const auto in = [&](double usual) {
+    return check_geometric(match, query, {planar_pose(0, 0, 0.0), 0.8, {.inlier_ratio = usual}}, {});
+  };
+  const GeometricEvidence field = in(0.7), shelves = in(1.0);
+  EXPECT_DOUBLE_EQ(field.evidence.inlier_ratio, shelves.evidence.inlier_ratio);
+  EXPECT_NEAR(field.evidence.inlier_share, shelves.evidence.inlier_ratio / 0.7, 1e-9);
+  EXPECT_GT(field.log_odds, shelves.log_odds + 3.0);
+}
+
 TEST(GeometricConsistency, FeaturesSaveAWrongYaw) {
   const Pose T_match = SyntheticWorld::at(0, 0, 0), T_query = SyntheticWorld::at(2, 1, to_radians(100.0));
   ScanGeometry match = scan_at(31, T_match), query = scan_at(31, T_query);
@@ -99,6 +110,7 @@ TEST(Judge, WhatIsKnownBesidesDecidesWhereTheScansLeaveItOpen) {
   GeometricEvidence found;
   found.has_converged = true;
   found.evidence = {.inlier_ratio = 0.68,
+                    .inlier_share = 0.8,
                     .free_space_agreement = 0.96,
                     .intensity_agreement = 0.9,
                     .rmse_m = 0.12,

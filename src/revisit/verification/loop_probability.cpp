@@ -8,12 +8,12 @@ namespace revisit {
 namespace {
 
 struct Coefficients {
-  double inlier_ratio, free_space, intensity, rmse_m, overlap, distance, distance_root, constant;
+  double inlier_share, free_space, intensity, rmse_m, overlap, distance, distance_root, constant;
 };
 
 // Learnt by scripts/learn_probability.py.
-constexpr Coefficients kWithIntensity{11.399, 2.656, 19.061, -53.284, 5.654, 2.631, 9.641, -32.688};
-constexpr Coefficients kWithoutIntensity{15.456, 2.557, 0.0, 0.0, 0.0, 4.993, 4.652, -22.246};
+constexpr Coefficients kWithIntensity{21.483, 0.810, 17.762, -65.184, 5.738, 6.232, 8.613, -32.360};
+constexpr Coefficients kWithoutIntensity{30.213, 0.158, 0.0, 0.0, 0.0, 15.161, -0.468, -26.153};
 constexpr double kFarthest_m = 12.0;  // beyond, nothing was learnt
 
 }  // namespace
@@ -23,7 +23,7 @@ double loop_log_odds(const LoopEvidence& evidence) {
   // Disagreement counts by its order of magnitude: one point in a hundred seen through, or three.
   const double free_space = -std::log(1.004 - std::clamp(evidence.free_space_agreement, 0.0, 1.0));
   const double distance = std::min(evidence.distance_m, kFarthest_m) / 10.0;  // in tens of metres
-  return c.constant + c.inlier_ratio * evidence.inlier_ratio + c.free_space * free_space +
+  return c.constant + c.inlier_share * evidence.inlier_share + c.free_space * free_space +
          c.intensity * evidence.intensity_agreement.value_or(0.0) + c.rmse_m * evidence.rmse_m +
          c.overlap * evidence.overlap + c.distance * distance + c.distance_root * std::sqrt(distance);
 }

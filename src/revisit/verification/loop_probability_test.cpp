@@ -6,12 +6,12 @@
 namespace revisit {
 namespace {
 
-LoopEvidence usual_revisit() { return {0.8, 0.985, 0.95, 0.12, 0.82, 1.0}; }
+LoopEvidence usual_revisit() { return {0.8, 0.95, 0.985, 0.95, 0.12, 0.82, 1.0}; }
 
 TEST(LoopProbability, AUsualRevisitIsSureAndALookAlikeIsNot) {
   EXPECT_GT(probability_of(loop_log_odds(usual_revisit())), 0.98);
   LoopEvidence look_alike = usual_revisit();
-  look_alike.inlier_ratio = 0.6;
+  look_alike.inlier_share = 0.7;
   look_alike.free_space_agreement = 0.955;
   look_alike.rmse_m = 0.18;
   look_alike.overlap = 0.7;
@@ -25,7 +25,7 @@ TEST(LoopProbability, EachPieceOfEvidenceCounts) {
     change(evidence);
     return loop_log_odds(evidence);
   };
-  EXPECT_LT(after([](LoopEvidence& e) { e.inlier_ratio -= 0.1; }), before);
+  EXPECT_LT(after([](LoopEvidence& e) { e.inlier_share -= 0.1; }), before);
   EXPECT_LT(after([](LoopEvidence& e) { e.free_space_agreement -= 0.02; }), before);
   EXPECT_LT(after([](LoopEvidence& e) { *e.intensity_agreement -= 0.1; }), before);
   EXPECT_LT(after([](LoopEvidence& e) { e.rmse_m += 0.02; }), before);
@@ -38,7 +38,7 @@ TEST(LoopProbability, WithoutIntensitiesGeometryDecides) {
   evidence.intensity_agreement.reset();
   const double before = loop_log_odds(evidence);
   EXPECT_GT(before, 1.0);
-  evidence.inlier_ratio = 0.45;
+  evidence.inlier_share = 0.5;
   EXPECT_LT(loop_log_odds(evidence), before);
   EXPECT_LT(probability_of(loop_log_odds({})), 0.01) << "of nothing, nothing follows";
 }
