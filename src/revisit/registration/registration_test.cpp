@@ -246,6 +246,15 @@ TEST(Agreement, IntensitiesAreComparedWhereThereAreAny) {
   EXPECT_FALSE(measure_agreement(a, c, Pose::Identity(), 0.4).intensity_correlation) << "all alike";
 }
 
+TEST(SeenSpace, KnowsHowMuchOfTheHorizonWasSeen) {
+  std::vector<Point> ahead;
+  for (double deg = -45.0; deg < 45.0; deg += 1.0)
+    ahead.push_back({static_cast<float>(10.0 * std::cos(to_radians(deg))),
+                     static_cast<float>(10.0 * std::sin(to_radians(deg))), 0.f, 0.f});
+  EXPECT_NEAR(SeenSpace(ahead).share_of_horizon(), 0.25, 0.01);
+  EXPECT_EQ(SeenSpace().share_of_horizon(), 1.0) << "not known";
+}
+
 TEST(SeenSpace, KnowsWhatLiesBeforeAndBehind) {
   std::vector<Point> points;
   for (int i = 0; i < 100; ++i) points.push_back({20.f, -1.f + 0.02f * static_cast<float>(i), 0.1f, 0.f});

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/verification/geometric.hpp>
 
+#include <algorithm>
 #include <optional>
 
 #include <revisit/core/text.hpp>
@@ -45,6 +46,7 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
     all.intensity_agreement = *agreement.intensity_correlation / view.usual.intensity_correlation;
   all.rmse_m = agreement.rmse_m;
   all.overlap = view.overlap;
+  all.horizon = std::min(match.seen().share_of_horizon(), query.seen().share_of_horizon());
   all.distance_m = icp.T_target_source.translation().norm();
   evidence.has_converged = icp.converged;
   judge(evidence, 0.0, options);

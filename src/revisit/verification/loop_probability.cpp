@@ -15,6 +15,9 @@ struct Coefficients {
 constexpr Coefficients kWithIntensity{21.483, 0.810, 17.762, -65.184, 5.738, 6.232, 8.613, -32.360};
 constexpr Coefficients kWithoutIntensity{30.213, 0.158, 0.0, 0.0, 0.0, 15.161, -0.468, -26.153};
 constexpr double kFarthest_m = 12.0;  // beyond, nothing was learnt
+// The less of the horizon a sensor sees, the more places look alike to it: a street looks much the same from both ends.
+// Chosen on two drives with a forward sensor (docs/accuracy.md).
+constexpr double kUnseenHorizon = -6.0;
 
 }  // namespace
 
@@ -25,7 +28,8 @@ double loop_log_odds(const LoopEvidence& evidence) {
   const double distance = std::min(evidence.distance_m, kFarthest_m) / 10.0;  // in tens of metres
   return c.constant + c.inlier_share * evidence.inlier_share + c.free_space * free_space +
          c.intensity * evidence.intensity_agreement.value_or(0.0) + c.rmse_m * evidence.rmse_m +
-         c.overlap * evidence.overlap + c.distance * distance + c.distance_root * std::sqrt(distance);
+         c.overlap * evidence.overlap + c.distance * distance + c.distance_root * std::sqrt(distance) +
+         kUnseenHorizon * (1.0 - evidence.horizon);
 }
 
 double probability_of(double log_odds) { return 1.0 / (1.0 + std::exp(-log_odds)); }

@@ -16,6 +16,7 @@ struct LoopEvidence {
   std::optional<double> intensity_agreement;
   double rmse_m = 0.0;      ///< point-to-plane, over the inliers
   double overlap = 0.0;     ///< of both scans seen from overhead
+  double horizon = 1.0;     ///< share of all headings in which something was seen, smaller of both scans
   double distance_m = 0.0;  ///< between both sensors: farther apart, less fits even at the same place
 };
 

@@ -6,7 +6,7 @@
 namespace revisit {
 namespace {
 
-LoopEvidence usual_revisit() { return {0.8, 0.95, 0.985, 0.95, 0.12, 0.82, 1.0}; }
+LoopEvidence usual_revisit() { return {0.8, 0.95, 0.985, 0.95, 0.12, 0.82, 1.0, 1.0}; }
 
 TEST(LoopProbability, AUsualRevisitIsSureAndALookAlikeIsNot) {
   EXPECT_GT(probability_of(loop_log_odds(usual_revisit())), 0.98);
@@ -30,6 +30,7 @@ TEST(LoopProbability, EachPieceOfEvidenceCounts) {
   EXPECT_LT(after([](LoopEvidence& e) { *e.intensity_agreement -= 0.1; }), before);
   EXPECT_LT(after([](LoopEvidence& e) { e.rmse_m += 0.02; }), before);
   EXPECT_LT(after([](LoopEvidence& e) { e.overlap -= 0.1; }), before);
+  EXPECT_LT(after([](LoopEvidence& e) { e.horizon = 0.2; }), before - 3.0) << "a narrow view";
   EXPECT_GT(after([](LoopEvidence& e) { e.distance_m += 4.0; }), before) << "from afar less must fit";
 }
 
