@@ -45,8 +45,8 @@ def load(folder):
             is_right = off_m <= RIGHT_M and angle <= RIGHT_DEG
             if not is_right and off_m < WRONG_M and angle < WRONG_DEG:
                 continue
-            X.append([float(row["inlier_share"]), -np.log(1.004 - free), float(row["intensity_agreement"]), float(row["rmse_m"]),
-                      float(row["overlap"]), distance, distance**0.5])
+            X.append([float(row["inlier_share"]), -np.log(1.004 - free), float(row["intensity_agreement"]),
+                      float(row["rmse_m"]), float(row["overlap"]), distance, distance**0.5])
             right.append(is_right)
             queries.append(int(row["query"]))
     return np.array(X), np.array(right), np.array(queries)
@@ -86,8 +86,8 @@ def main():
             found = {q: max(odds[right & (queries == q)]) for q in set(queries[right])}
             best = np.array(list(found.values()))
             taken = [f"{(best > t).sum()}/{(odds[~right] > t).sum()}" for t in (0.0, 1.0, 2.0, 3.0)]
-            print(f"  {folder.name}: {right.sum()} right, {(~right).sum()} wrong; learnt on the others, of {len(best)} queries found / "
-                  f"wrong ones taken at log odds 0, 1, 2, 3: {', '.join(taken)}; most of a wrong one "
+            print(f"  {folder.name}: {right.sum()} right, {(~right).sum()} wrong; learnt on the others, of {len(best)} "
+                  f"queries found / wrong ones taken at log odds 0, 1, 2, 3: {', '.join(taken)}; most of a wrong one "
                   f"{odds[~right].max(initial=-99):.2f}, {own[~right].max(initial=-99):.2f} learnt on all")
 
 

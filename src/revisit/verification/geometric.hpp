@@ -27,8 +27,8 @@ struct GeometricEvidence {
 
 /// What consecutive scans of this sensor show of each other: it hardly gets better than that.
 struct UsualAgreement {
-  double inlier_ratio = 0.9;
-  double intensity_correlation = 0.95;
+  double inlier_ratio = 0.9;            ///< above 0, up to 1; of the last few scans, where that is known
+  double intensity_correlation = 0.95;  ///< above 0, up to 1; the median of all
 };
 
 /// What is known of a candidate before it is registered.
