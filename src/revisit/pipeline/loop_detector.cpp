@@ -161,8 +161,10 @@ Status LoopDetector::verify(Detection& detection, const PreparedScan& prepared) 
     Opinion& best = **answer;
     const std::optional<Station>& place = stations_.at(best.candidate.match);
     if (best.reason.empty()) {
-      if (parameters_.geometric.follow && prepared.station && place && verification.is_sure(best.own_log_odds()))
-        track_.add(*prepared.station, best.candidate.match, *place, best.geometric->T_match_query, best.own_log_odds());
+      // What it shows itself must be in favour: where nothing is to be seen, a robot is not followed for ever.
+      if (parameters_.geometric.follow && prepared.station && place && best.own_log_odds() > 0.0)
+        track_.add(*prepared.station, best.candidate.match, *place, best.geometric->T_match_query,
+                   best.geometric->log_odds);
       refine(*best.geometric, *best.geometry, verification.query_geometry());
       const GeometricEvidence& found = *best.geometric;
       detection.loop =

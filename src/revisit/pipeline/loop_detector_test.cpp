@@ -81,6 +81,25 @@ TEST(LoopDetector, ALoopIsFollowedPastWhatStandsInTheWay) {
   EXPECT_FALSE(run(false, 0).loop) << "nor where loops are not followed";
 }
 
+// After a sure loop, to and fro with so little in view that none of these scans would do alone.
+TEST(LoopDetector, ALoopIsFollowedAsLongAsTheScansSpeakForIt) {
+  const SyntheticWorld world(51);
+  const auto at = [](int i) { return SyntheticWorld::at(14.0 + i % 2, 0, 0); };
+  LoopDetector detector{Parameters{}};
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(detector.add(scan_at(world, i, at(i), static_cast<unsigned>(i))));
+  ASSERT_TRUE(detector.process(scan_at(world, 1000, at(0), 100))->loop);
+  for (int i = 1; i < 38; ++i) {  // a metre each; a loop alone leads 30
+    const auto detection =
+        detector.process(blocked(scan_at(world, 1000 + i, at(i), 100U + static_cast<unsigned>(i)), 130.0));
+    ASSERT_TRUE(detection && detection->geometric);
+    EXPECT_TRUE(detection->loop) << detection->reason;
+    if (i < 6) continue;
+    const double own = loop_log_odds(detection->geometric->evidence);
+    EXPECT_LT(probability_of(own), 0.95) << "frame " << i << " needs nobody";
+    EXPECT_GT(own, 0.0) << "frame " << i;
+  }
+}
+
 TEST(LoopDetector, OfAFarAnswerAndAMuchNearerPlaceTheNearerOneDecides) {
   const SyntheticWorld world(51);
   const auto run = [&](bool fits_nearby) {
