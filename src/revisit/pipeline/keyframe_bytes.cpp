@@ -104,7 +104,7 @@ std::optional<IntensityScanContext> to_descriptor(std::span<const std::byte> byt
 
 Bytes to_bytes(const ThinCloud& cloud) {
   Writer writer;
-  writer.put(cloud.voxel_m).put(static_cast<std::uint32_t>(cloud.points.size()));
+  writer.put(cloud.voxel_m).put(Position{cloud.up.x(), cloud.up.y(), cloud.up.z()}).put(static_cast<std::uint32_t>(cloud.points.size()));
   for (const Eigen::Vector3f& p : cloud.points) writer.put(Position{p.x(), p.y(), p.z()});
   return writer.put_counted(cloud.is_ground).put_counted(cloud.intensity).put_counted(cloud.seen.ranges_cm()).take();
 }
@@ -113,13 +113,15 @@ std::optional<ThinCloud> to_thin_cloud(std::span<const std::byte> bytes) {
   Reader reader(bytes);
   ThinCloud cloud;
   cloud.voxel_m = reader.get<float>();
+  const auto up = reader.get<Position>();
+  cloud.up = {up[0], up[1], up[2]};
   for (const Position& p : reader.get_counted<Position>()) cloud.points.emplace_back(p[0], p[1], p[2]);
   cloud.is_ground = reader.get_counted<std::uint8_t>();
   cloud.intensity = reader.get_counted<float>();
   auto seen = SeenSpace::from_ranges_cm(reader.get_counted<std::uint16_t>());
   const std::size_t count = cloud.points.size();
   if (!reader.is_at_end() || !seen || cloud.is_ground.size() != count || cloud.intensity.size() != count ||
-      !(cloud.voxel_m > 0.f) ||
+      !(cloud.voxel_m > 0.f) || !(std::abs(cloud.up.norm() - 1.f) < 1e-3f) ||
       !std::all_of(cloud.points.begin(), cloud.points.end(), [](const Eigen::Vector3f& p) { return p.allFinite(); }))
     return std::nullopt;
   cloud.seen = *std::move(seen);

@@ -29,7 +29,8 @@ Status LoopVerification::look_at(std::span<const LoopCandidate> candidates) {
   for (const LoopCandidate& candidate : candidates) {
     auto place = known_.clouds.get(candidate.match);
     if (!place) return place.error();
-    opinions_.emplace_back(candidate).place = *std::move(place);
+    Opinion& opinion = opinions_.emplace_back(candidate, *std::move(place));
+    opinion.T_guess_match_query = from_upright(opinion, planar_pose(0, 0, candidate.yaw_rad));
   }
   if (options_.overhead_search) {
     // Half a sector of the descriptor and a little more.
@@ -62,11 +63,11 @@ Result<Opinion> LoopVerification::register_at(const LoopTrack::Expectation& wher
   if (const auto descriptor = known_.index.find(where.match))
     candidate = match_descriptors(query_.descriptor, *descriptor);
   candidate.match = where.match;
-  candidate.yaw_rad = yaw_of(where.T_match_query);
   auto place = known_.clouds.get(where.match);
   if (!place) return place.error();
-  Opinion opinion(candidate);
-  opinion.place = *std::move(place);
+  candidate.yaw_rad =
+      yaw_of(upright_pose((*place)->up) * where.T_match_query * upright_pose(query_.cloud.up).inverse());
+  Opinion opinion(candidate, *std::move(place));
   look_from_overhead(to_radians(3.0), opinion);
   opinion.T_guess_match_query = where.T_match_query;
   opinion.reason.clear();  // however little overlaps: something stands in the way, not elsewhere
@@ -87,10 +88,15 @@ void LoopVerification::register_it(Opinion& opinion) {
   opinion.reason = opinion.geometric->reason;
 }
 
+// How the two scans lie to each other as they were taken, from how they would if both stood upright.
+Pose LoopVerification::from_upright(const Opinion& opinion, const Pose& T_match_query_upright) const {
+  return upright_pose(opinion.place->up).inverse() * T_match_query_upright * upright_pose(query_.cloud.up);
+}
+
 void LoopVerification::look_from_overhead(double yaw_reach_rad, Opinion& opinion) {
   const OverheadMatch found =
       overhead_.search(*opinion.place, opinion.candidate.yaw_rad, yaw_reach_rad, kOverheadReach_m);
-  opinion.T_guess_match_query = planar_pose(found.x_m, found.y_m, found.yaw_rad);
+  opinion.T_guess_match_query = from_upright(opinion, planar_pose(found.x_m, found.y_m, found.yaw_rad));
   opinion.overlap = found.overlap;
   if (found.overlap < options_.min_overlap)
     opinion.reason = format("overlap from overhead %.2f below %.2f", found.overlap, options_.min_overlap);

@@ -15,8 +15,9 @@ using testing_support::SyntheticWorld;
 
 const SyntheticWorld::Sensor kSensor{32, 900, -24.8, 5.0};
 
-Scan scan_at(const SyntheticWorld& world, int frame, const Pose& T, unsigned seed) {
-  Scan scan = world.scan(T, kSensor, seed);
+Scan scan_at(const SyntheticWorld& world, int frame, const Pose& T, unsigned seed,
+             const SyntheticWorld::Sensor& sensor = kSensor) {
+  Scan scan = world.scan(T, sensor, seed);
   scan.frame = FrameId{frame};
   scan.stamp_s = 0.1 * frame;
   return scan;
@@ -45,6 +46,28 @@ TEST(LoopDetector, FindsThePlaceAndThePoseOfAReverseVisit) {
   EXPECT_EQ(detection->row().match->value, 4);
   EXPECT_TRUE(detection->row().accepted);
   EXPECT_FALSE(detection->T_match_query_by_odometry) << "the match came without a pose";
+}
+
+// As above, with a sensor that leans one way on the way out and the other way on the way back.
+TEST(LoopDetector, FindsThePlaceAndThePoseOfATiltedSensor) {
+  const SyntheticWorld world(51);
+  const SyntheticWorld::Sensor wide{48, 600, -35.0, 35.0};
+  const auto tilted = [](Pose T, double roll_deg) {
+    return T.rotate(Eigen::AngleAxisd(to_radians(roll_deg), Eigen::Vector3d::UnitX()));
+  };
+  LoopDetector detector{Parameters{}};
+  for (int i = 0; i < 8; ++i)
+    ASSERT_TRUE(detector.add(scan_at(world, i, tilted(SyntheticWorld::at(-28.0 + 8.0 * i, 0, 0), 15.0),
+                                     static_cast<unsigned>(i), wide)));
+  const Pose T_query = tilted(SyntheticWorld::at(5.0, 1.0, to_radians(176.0)), 15.0);
+  const auto detection = detector.process(scan_at(world, 1000, T_query, 99, wide));
+  ASSERT_TRUE(detection);
+  ASSERT_TRUE(detection->loop) << detection->reason;
+  EXPECT_EQ(detection->loop->match.value, 4) << "the place at x = 4";
+  const Pose T_place = tilted(SyntheticWorld::at(4.0, 0, 0), 15.0);
+  const Pose error = (T_place.inverse() * T_query).inverse() * detection->loop->T_match_query;
+  EXPECT_LT(error.translation().norm(), 0.15) << "in the frames of the sensor as it leaned";
+  EXPECT_LT(to_degrees(rotation_angle(error)), 0.5);
 }
 
 // Something large and near to all sides but one; of the street, a part is left.

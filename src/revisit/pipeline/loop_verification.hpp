@@ -21,7 +21,7 @@ namespace revisit {
 
 /// What is found out about a candidate, step by step.
 struct Opinion {
-  explicit Opinion(const LoopCandidate& of) : candidate(of), T_guess_match_query(planar_pose(0, 0, of.yaw_rad)) {}
+  Opinion(const LoopCandidate& of, std::shared_ptr<const ThinCloud> at) : candidate(of), place(std::move(at)) {}
   /// Orders answers: docs/method.md, section 7.
   double score() const;
   /// Of what was registered, without what speaks for it besides.
@@ -30,7 +30,7 @@ struct Opinion {
 
   LoopCandidate candidate;
   std::shared_ptr<const ThinCloud> place;
-  Pose T_guess_match_query;
+  Pose T_guess_match_query = Pose::Identity();
   double overlap = 0.0;  ///< seen from overhead
   TemporalEvidence temporal;
   std::shared_ptr<const ScanGeometry> geometry;  ///< of the place, where it was registered
@@ -71,6 +71,7 @@ class LoopVerification {
   Result<Opinion> register_at(const LoopTrack::Expectation& where);
   void register_it(Opinion& opinion);
   void look_from_overhead(double yaw_reach_rad, Opinion& opinion);
+  Pose from_upright(const Opinion& opinion, const Pose& T_match_query_upright) const;
   void check_temporal_and_scores(Opinion& opinion) const;
   // loop_verification.cpp: who is asked, and what follows.
   Result<std::optional<Opinion>> expected();

@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <chrono>
 
+#include <oneapi/tbb/parallel_invoke.h>
+
 #include <revisit/preprocess/range_filter.hpp>
 #include <revisit/preprocess/rings.hpp>
 #include <revisit/preprocess/undistort.hpp>
+#include <revisit/preprocess/upright.hpp>
 
 namespace revisit {
 namespace {
@@ -35,6 +38,20 @@ double Stopwatch::lap_ms() {
 
 namespace {
 
+// About the sensor; those of an upright one are not touched.
+void turn(std::span<Point> points, const Pose& T) {
+  const Eigen::Matrix3f R = T.linear().cast<float>();
+  if (R.isIdentity(0.f)) return;
+  for (Point& p : points) {
+    const Eigen::Vector3f q = R * Eigen::Vector3f(p.x, p.y, p.z);
+    p = {q.x(), q.y(), q.z(), p.intensity};
+  }
+}
+
+Twist turned(const Twist& motion, const Pose& T) {
+  return {T.linear() * motion.linear_mps, T.linear() * motion.angular_radps};
+}
+
 // The middle of the heights of the ground nearby; where there is none, that of a sensor on a car.
 double ground_below_sensor_m(std::span<const Point> points, std::span<const std::uint8_t> is_ground) {
   constexpr float kNearby_m = 15.f;
@@ -60,7 +77,11 @@ Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const
   filter_range(prepared.scan, parameters.preprocess);
   prepared.ms.filter = watch.lap_ms();
 
-  const Rings rings = find_rings(prepared.scan);
+  Rings rings;
+  Eigen::Vector3f up;
+  tbb::parallel_invoke([&] { rings = find_rings(prepared.scan); }, [&] { up = find_up(prepared.scan.points); });
+  const Pose T_upright_lidar = upright_pose(up);
+  turn(prepared.scan.points, T_upright_lidar);
   prepared.ground = segment_ground(prepared.scan, rings, parameters.preprocess);
   prepared.ms.ground = watch.lap_ms();
 
@@ -68,7 +89,7 @@ Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const
   const bool rings_fit = rings.count() == calibration.ring_gains.size();
   normalise_intensity(prepared.scan, scale, calibration,
                       rings_fit ? std::span<const std::uint16_t>(rings.of_point) : std::span<const std::uint16_t>());
-  if (motion) undistort(prepared.scan, *motion);
+  if (motion) undistort(prepared.scan, turned(*motion, T_upright_lidar));
   prepared.ms.intensity = watch.lap_ms();
 
   prepared.ground_z_m = ground_below_sensor_m(prepared.scan.points, prepared.ground.is_ground);
@@ -84,7 +105,9 @@ Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const
                  std::to_string(prepared.descriptor.image_cells()) + " cells; at least " +
                  std::to_string(parameters.descriptor.min_occupied_cells) + " are needed to describe a place"};
 
+  turn(prepared.scan.points, T_upright_lidar.inverse());
   prepared.cloud = thin(prepared.scan.points, prepared.ground.is_ground, parameters.geometric.voxel_m);
+  prepared.cloud.up = up;
   prepared.ms.thin = watch.lap_ms();
   return prepared;
 }

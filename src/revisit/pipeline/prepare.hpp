@@ -25,7 +25,7 @@ struct PreparedScan {
   Scan scan;
   GroundSegmentation ground;
   IntensityScanContext descriptor;
-  double ground_z_m = 0.0;                       ///< where the ground below the sensor lies, in its frame
+  double ground_z_m = 0.0;                       ///< where the ground lies below the sensor, were it upright
   ThinCloud cloud;                               ///< for registration; the ground is kept and marked
   std::shared_ptr<const ScanGeometry> geometry;  ///< of the cloud, where somebody has asked for it already
   std::optional<Station> station;                ///< where it was taken along the sensor's way, where that is known
@@ -38,7 +38,8 @@ struct PreparedScan {
 };
 
 /// The paper's sections III-A and III-B in order; with the sensor's `motion`, the distortion of the sweep is undone
-/// after the ground is found. An error says why the scan describes no place.
+/// after the ground is found. A scan of a tilted sensor is set upright while its ground is found and it is described
+/// (ThinCloud::up); its points stay as they are. An error says why the scan describes no place.
 Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const IntensityScale& scale,
                                   const IntensityCalibration& calibration = {},
                                   const std::optional<Twist>& motion = std::nullopt);

@@ -13,10 +13,9 @@ namespace {
 
 using preprocess_internal::RangeImage;
 
-// LeGO-LOAM's vertical test: the line between two returns of neighbouring rings rises at most by the slope. Only rings
-// that look down can meet the ground first.
-std::vector<std::uint8_t> label_pixels(const Scan& scan, const Rings& rings, const RangeImage& image,
-                                       double slope_deg) {
+// LeGO-LOAM's vertical test: the line between two returns of neighbouring rings rises at most by the slope. Only returns
+// from below the sensor can be on the ground.
+std::vector<std::uint8_t> label_pixels(const Scan& scan, const RangeImage& image, double slope_deg) {
   const float tan2 = static_cast<float>(std::pow(std::tan(to_radians(slope_deg)), 2));
   std::vector<std::uint8_t> labels(image.point_at.size(), 0);
   const auto is_level = [&](std::int32_t a, std::int32_t b) {
@@ -25,11 +24,11 @@ std::vector<std::uint8_t> label_pixels(const Scan& scan, const Rings& rings, con
     const float dx = p.x - q.x, dy = p.y - q.y, dz = p.z - q.z;
     return dz * dz <= tan2 * (dx * dx + dy * dy);
   };
-  for (std::size_t row = 0; row + 1 < image.rows && rings.elevations_rad[row] < 0.f; ++row) {
+  for (std::size_t row = 0; row + 1 < image.rows; ++row) {
     for (std::size_t column = 0; column < image.columns; ++column) {
       const std::size_t lower = row * image.columns + column;
       const std::int32_t a = image.point_at[lower];
-      if (a == RangeImage::kEmpty) continue;
+      if (a == RangeImage::kEmpty || scan.points[static_cast<std::size_t>(a)].z >= 0.f) continue;
       // A single lost return must not end the ground: one missing row is bridged.
       for (std::size_t step = 1; step <= 2 && row + step < image.rows; ++step) {
         const std::size_t upper = lower + step * image.columns;
@@ -100,7 +99,7 @@ GroundSegmentation segment_ground(const Scan& scan, const Rings& rings, const Pr
     return result;
   }
   const RangeImage image = preprocess_internal::make_range_image(scan, rings);
-  std::vector<std::uint8_t> labels = label_pixels(scan, rings, image, options.ground_slope_deg);
+  std::vector<std::uint8_t> labels = label_pixels(scan, image, options.ground_slope_deg);
   remove_small_segments(scan, image, options.ground_min_segment_points, labels);
   result.is_ground = label_points(scan, image, labels);
   return result;

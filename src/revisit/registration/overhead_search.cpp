@@ -65,12 +65,12 @@ std::uint64_t common(const OverheadImage& fixed, const OverheadImage& moving, in
 
 OverheadImage overhead_image(const ThinCloud& cloud, double yaw_rad) {
   OverheadImage image;
-  const auto c = static_cast<float>(std::cos(yaw_rad)), s = static_cast<float>(std::sin(yaw_rad));
+  const Eigen::Matrix3f turn = (planar_pose(0.0, 0.0, yaw_rad) * upright_pose(cloud.up)).linear().cast<float>();
   constexpr float kMiddle = 0.5f * kSide;
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
     if (cloud.is_ground[i] != 0) continue;
     const Eigen::Vector3f& p = cloud.points[i];
-    const float x = c * p.x() - s * p.y() + kMiddle, y = s * p.x() + c * p.y() + kMiddle;
+    const float x = turn.row(0).dot(p) + kMiddle, y = turn.row(1).dot(p) + kMiddle;
     if (!(x >= 0.f && x < kSide && y >= 0.f && y < kSide)) continue;
     const std::size_t bit = static_cast<std::size_t>(y) * kSide + static_cast<std::size_t>(x);
     image.bits[bit / 64] |= std::uint64_t{1} << (bit % 64);

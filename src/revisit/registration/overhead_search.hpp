@@ -20,12 +20,12 @@ struct OverheadImage {
   std::size_t count = 0;                     ///< of bits that are set
 };
 
-/// The image of a cloud turned by `yaw_rad` (counter-clockwise seen from above).
+/// The image of a cloud that was set upright (ThinCloud::up), turned by `yaw_rad` (counter-clockwise seen from above).
 OverheadImage overhead_image(const ThinCloud& cloud, double yaw_rad = 0.0);
 
 struct OverheadMatch {
-  double yaw_rad = 0.0;         ///< heading of the query in the match's frame
-  double x_m = 0.0, y_m = 0.0;  ///< position of the query in the match's frame, whole metres
+  double yaw_rad = 0.0;         ///< heading of the query in the match's frame, both upright
+  double x_m = 0.0, y_m = 0.0;  ///< position of the query in the match's upright frame, whole metres
   double overlap = 0.0;         ///< share of each image that lies on or beside the other's, the smaller of both, [0, 1]
 };
 

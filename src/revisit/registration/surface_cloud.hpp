@@ -23,6 +23,7 @@ struct ThinCloud {
   std::vector<std::uint8_t> is_ground;  ///< one a point: most of its voxel lay on the ground
   std::vector<float> intensity;         ///< one a point: mean of its voxel, as far as the scan has been normalised
   float voxel_m = 1.f;
+  Eigen::Vector3f up = Eigen::Vector3f::UnitZ();  ///< from the ground: another than z where the sensor is tilted
   SeenSpace seen;  ///< of the scan it was thinned from
 };
 

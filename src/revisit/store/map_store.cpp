@@ -12,7 +12,7 @@ namespace {
 
 using store_internal::Statement;
 
-constexpr int kApplication = 0x52565354, kVersion = 1;
+constexpr int kApplication = 0x52565354, kVersion = 2;
 constexpr const char* kSchema = R"(
 CREATE TABLE notes(name TEXT PRIMARY KEY, text TEXT NOT NULL);
 CREATE TABLE keyframes(frame INTEGER PRIMARY KEY, stamp_s REAL NOT NULL, T_odom_lidar BLOB NOT NULL,
