@@ -3,8 +3,8 @@
 #include <cmath>
 #include <limits>
 
+#include <revisit/core/fast_angle.hpp>
 #include <revisit/core/pose.hpp>
-#include <revisit/preprocess/internal/fast_angle.hpp>
 #include <revisit/preprocess/internal/polar_ground.hpp>
 
 namespace revisit::preprocess_internal {

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <revisit/core/fast_angle.hpp>
 #include <revisit/core/pose.hpp>
-#include <revisit/preprocess/internal/fast_angle.hpp>
 #include <revisit/preprocess/internal/range_image.hpp>
 
 namespace revisit::preprocess_internal {

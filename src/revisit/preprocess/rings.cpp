@@ -7,8 +7,8 @@
 #include <numeric>
 #include <optional>
 
+#include <revisit/core/fast_angle.hpp>
 #include <revisit/core/pose.hpp>
-#include <revisit/preprocess/internal/fast_angle.hpp>
 
 namespace revisit {
 namespace {
@@ -21,7 +21,7 @@ std::vector<float> elevations_of(const Scan& scan) {
   std::vector<float> elevations(scan.points.size());
   for (std::size_t i = 0; i < elevations.size(); ++i) {
     const Point& p = scan.points[i];
-    elevations[i] = preprocess_internal::approximate_atan2(p.z, std::sqrt(p.x * p.x + p.y * p.y));
+    elevations[i] = approximate_atan2(p.z, std::sqrt(p.x * p.x + p.y * p.y));
   }
   return elevations;
 }

@@ -56,7 +56,7 @@ bool is_ground(const Eigen::Vector3f& n, float d, const Cloud& around, const pcl
 
 Eigen::Vector3f find_up(std::span<const Point> points) {
   constexpr std::size_t kFewest = 100;
-  constexpr double kMostTilt_deg = 40.0, kLevel_deg = 4.0;
+  constexpr double kMostTilt_deg = 40.0, kLevel_deg = 8.0;
   constexpr int kPlanes = 100;
   const Eigen::Vector3f straight = Eigen::Vector3f::UnitZ();
   const Cloud::Ptr around = sample_around(points);

@@ -10,7 +10,7 @@
 namespace revisit {
 
 /// Which way is up (a unit vector in the frame of the points): the normal of the ground around the sensor, of up to
-/// 40 degrees of tilt. Straight along z where the ground is within 4 degrees of level, as under a car, or is not to be
+/// 40 degrees of tilt. Straight along z where the ground is within 8 degrees of level, as under a car, or is not to be
 /// seen. The same points give the same answer.
 Eigen::Vector3f find_up(std::span<const Point> points);
 

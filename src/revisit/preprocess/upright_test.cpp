@@ -23,7 +23,7 @@ Pose tilted(const Eigen::Vector3d& axis, double tilt_deg) {
 TEST(FindUp, IsTheNormalOfTheGroundUnderATiltedSensor) {
   const SyntheticWorld world(51);
   for (const Eigen::Vector3d& axis : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, -1, 0), Eigen::Vector3d(1, 2, 0)})
-    for (const double tilt_deg : {6.0, 15.0, 30.0}) {
+    for (const double tilt_deg : {9.5, 15.0, 30.0}) {
       const Pose T_world_lidar = tilted(axis, tilt_deg);
       const Eigen::Vector3f up = find_up(world.scan(T_world_lidar, {16, 900, -15.0, 15.0}).points);
       const Eigen::Vector3d truth = T_world_lidar.linear().transpose() * Eigen::Vector3d::UnitZ();
@@ -36,7 +36,7 @@ TEST(FindUp, IsTheNormalOfTheGroundUnderATiltedSensor) {
 
 TEST(FindUp, IsStraightWhereTheSensorIsLevelOrNoGroundIsSeen) {
   const SyntheticWorld world(51);
-  EXPECT_EQ(find_up(world.scan(tilted({1, 0, 0}, 2.0), {16, 900, -15.0, 15.0}).points), kStraight) << "as a car rolls";
+  EXPECT_EQ(find_up(world.scan(tilted({1, 0, 0}, 5.0), {16, 900, -15.0, 15.0}).points), kStraight) << "as a car rolls";
   EXPECT_EQ(find_up({}), kStraight);
   testing::internal::CaptureStderr();
   std::vector<Point> line, wall, ceiling;

@@ -255,6 +255,26 @@ TEST(SeenSpace, KnowsHowMuchOfTheHorizonWasSeen) {
   EXPECT_EQ(SeenSpace().share_of_horizon(), 1.0) << "not known";
 }
 
+TEST(SeenSpace, PutsPointsWhereExactAnglesDo) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> metres(-60.f, 60.f);
+  constexpr double kCellsADegree = 1.0 / 3.0;
+  int compared = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const Point p{metres(random), metres(random), metres(random) / 2.f, 0.f};
+    const double azimuth = kCellsADegree * (to_degrees(std::atan2(double{p.y}, double{p.x})) + 180.0);
+    const double elevation = kCellsADegree * (to_degrees(std::atan2(double{p.z}, std::hypot(p.x, p.y))) + 45.0);
+    const auto is_open = [](double cells) { return std::abs(cells - std::round(cells)) < 1e-4; };
+    if (elevation < 0.0 || elevation >= 30.0 || is_open(azimuth) || is_open(elevation)) continue;
+    const auto ranges = SeenSpace(std::span(&p, 1)).ranges_cm();
+    ASSERT_EQ(ranges.size(), 2u * 120u * 30u);
+    const auto cell = static_cast<std::size_t>(azimuth) * 30 + static_cast<std::size_t>(elevation);
+    ASSERT_GT(ranges[2 * cell + 1], 0) << azimuth << ", " << elevation;
+    ++compared;
+  }
+  EXPECT_GT(compared, 15000);
+}
+
 TEST(SeenSpace, KnowsWhatLiesBeforeAndBehind) {
   std::vector<Point> points;
   for (int i = 0; i < 100; ++i) points.push_back({20.f, -1.f + 0.02f * static_cast<float>(i), 0.1f, 0.f});

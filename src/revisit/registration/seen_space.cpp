@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include <revisit/core/fast_angle.hpp>
 #include <revisit/core/pose.hpp>
 
 namespace revisit {
@@ -13,11 +14,17 @@ namespace {
 constexpr int kAzimuths = 120, kElevations = 30;
 constexpr auto kCellsARad = static_cast<float>(kAzimuths / (2.0 * kPi));
 
+// An angle in cells: quickly, and exactly where it comes near to a border.
+float in_cells(float y, float x, float offset_rad) {
+  constexpr float kNear = 1e-3f;  // cells; more than the quick one may be off
+  const float quick = (approximate_atan2(y, x) + offset_rad) * kCellsARad;
+  return std::abs(quick - std::round(quick)) > kNear ? quick : (std::atan2(y, x) + offset_rad) * kCellsARad;
+}
+
 std::optional<std::size_t> cell_of(float x, float y, float z) {
-  const float rho = std::hypot(x, y);
-  const float elevation = std::atan2(z, rho) * kCellsARad + kElevations / 2.f;
+  const float elevation = in_cells(z, std::sqrt(x * x + y * y), kElevations / 2.f / kCellsARad);
   if (!(elevation >= 0.f && elevation < kElevations)) return std::nullopt;
-  const float azimuth = (std::atan2(y, x) + static_cast<float>(kPi)) * kCellsARad;
+  const float azimuth = in_cells(y, x, static_cast<float>(kPi));
   const int column = static_cast<int>(azimuth) % kAzimuths;
   return static_cast<std::size_t>(column * kElevations + static_cast<int>(elevation));
 }
