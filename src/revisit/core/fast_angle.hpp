@@ -5,8 +5,8 @@
 
 namespace revisit {
 
-/// atan2 within 2e-5 rad, in [-pi, pi]: enough to choose a column, a ring or a cell. Without branches, so that compilers turn
-/// loops over it into SIMD.
+/// atan2 within 2e-5 rad, in [-pi, pi]: enough to choose a column, a ring or a cell. Without branches, so that
+/// compilers turn loops over it into SIMD.
 inline float approximate_atan2(float y, float x) {
   constexpr float kHalfTurn = 3.14159265f;
   const float ax = std::abs(x), ay = std::abs(y);

@@ -104,7 +104,9 @@ std::optional<IntensityScanContext> to_descriptor(std::span<const std::byte> byt
 
 Bytes to_bytes(const ThinCloud& cloud) {
   Writer writer;
-  writer.put(cloud.voxel_m).put(Position{cloud.up.x(), cloud.up.y(), cloud.up.z()}).put(static_cast<std::uint32_t>(cloud.points.size()));
+  writer.put(cloud.voxel_m)
+      .put(Position{cloud.up.x(), cloud.up.y(), cloud.up.z()})
+      .put(static_cast<std::uint32_t>(cloud.points.size()));
   for (const Eigen::Vector3f& p : cloud.points) writer.put(Position{p.x(), p.y(), p.z()});
   return writer.put_counted(cloud.is_ground).put_counted(cloud.intensity).put_counted(cloud.seen.ranges_cm()).take();
 }

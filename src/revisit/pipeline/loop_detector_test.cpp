@@ -57,8 +57,8 @@ TEST(LoopDetector, FindsThePlaceAndThePoseOfATiltedSensor) {
   };
   LoopDetector detector{Parameters{}};
   for (int i = 0; i < 8; ++i)
-    ASSERT_TRUE(detector.add(scan_at(world, i, tilted(SyntheticWorld::at(-28.0 + 8.0 * i, 0, 0), 15.0),
-                                     static_cast<unsigned>(i), wide)));
+    ASSERT_TRUE(detector.add(
+        scan_at(world, i, tilted(SyntheticWorld::at(-28.0 + 8.0 * i, 0, 0), 15.0), static_cast<unsigned>(i), wide)));
   const Pose T_query = tilted(SyntheticWorld::at(5.0, 1.0, to_radians(176.0)), 15.0);
   const auto detection = detector.process(scan_at(world, 1000, T_query, 99, wide));
   ASSERT_TRUE(detection);

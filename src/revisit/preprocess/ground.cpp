@@ -13,8 +13,8 @@ namespace {
 
 using preprocess_internal::RangeImage;
 
-// LeGO-LOAM's vertical test: the line between two returns of neighbouring rings rises at most by the slope. Only returns
-// from below the sensor can be on the ground.
+// LeGO-LOAM's vertical test: the line between two returns of neighbouring rings rises at most by the slope. Only
+// returns from below the sensor can be on the ground.
 std::vector<std::uint8_t> label_pixels(const Scan& scan, const RangeImage& image, double slope_deg) {
   const float tan2 = static_cast<float>(std::pow(std::tan(to_radians(slope_deg)), 2));
   std::vector<std::uint8_t> labels(image.point_at.size(), 0);

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
 #include <pcl/common/centroid.h>
 #include <pcl/console/print.h>
 #include <pcl/sample_consensus/ransac.h>
 #include <pcl/sample_consensus/sac_model_perpendicular_plane.h>
+#include <Eigen/Eigenvalues>
 
 #include <revisit/core/pose.hpp>
 
@@ -44,7 +44,8 @@ bool is_ground(const Eigen::Vector3f& n, float d, const Cloud& around, const pcl
   const auto below = static_cast<float>(std::count_if(
       around.begin(), around.end(), [&](const auto& p) { return n.dot(p.getVector3fMap()) + d < -kBelow_m; }));
   const auto all = static_cast<float>(around.size());
-  if (d < kThickness_m || static_cast<float>(on_it.size()) < kLeastShare * all || below > kMostBelow * all) return false;
+  if (d < kThickness_m || static_cast<float>(on_it.size()) < kLeastShare * all || below > kMostBelow * all)
+    return false;
   Eigen::Matrix3f covariance;
   Eigen::Vector4f middle;
   pcl::computeMeanAndCovarianceMatrix(around, on_it, covariance, middle);

@@ -24,7 +24,7 @@ struct ThinCloud {
   std::vector<float> intensity;         ///< one a point: mean of its voxel, as far as the scan has been normalised
   float voxel_m = 1.f;
   Eigen::Vector3f up = Eigen::Vector3f::UnitZ();  ///< from the ground: another than z where the sensor is tilted
-  SeenSpace seen;  ///< of the scan it was thinned from
+  SeenSpace seen;                                 ///< of the scan it was thinned from
 };
 
 /// Thins `points`, which are finite, with cubic voxels of `voxel_m`; points more than 1,024 voxels out are taken
