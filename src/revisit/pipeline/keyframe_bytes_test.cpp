@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/pipeline/keyframe_bytes.hpp>
 
+#include <limits>
+
 #include <gtest/gtest.h>
 
 #include "synthetic_world.hpp"

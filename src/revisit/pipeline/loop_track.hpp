@@ -36,7 +36,7 @@ class LoopTrack {
     Pose T_match_query = Pose::Identity();
   };
 
-  /// Remembers a loop, as sure as its own evidence makes it (log odds).
+  /// Remembers a loop, as sure (log odds) as its own evidence and the loops that led to it make it.
   void add(const Station& query, FrameId match, const Station& place, const Pose& T_match_query, double log_odds);
   /// Where the surest loop of the last metres says that the query stands, seen from the nearest place that is no newer
   /// than `newest`.
