@@ -1,6 +1,9 @@
 # The front door on a bare Debian 12 machine. `make demo` and `make test` install what is missing, build and run.
 .PHONY: demo test build configure packages bench lint format sanitize clean
 JOBS ?= $(shell nproc)
+# What ccache keeps of one clone serves the others.
+export CCACHE_BASEDIR ?= $(CURDIR)
+export CCACHE_NOHASHDIR ?= 1
 
 demo: packages configure
 	cmake --build --preset release --parallel $(JOBS) --target revisit
@@ -32,8 +35,9 @@ sanitize: packages
 	ctest --preset debug --parallel $(JOBS)
 
 SOURCES = $(shell git ls-files '*.cpp' '*.hpp' '*.h')
-lint: build
+lint: packages
 	@scripts/install_packages.sh clang-format clang-tidy
+	@cmake --preset debug --log-level=NOTICE > /dev/null
 	clang-format --dry-run --Werror $(SOURCES)
 	python3 scripts/check_layers.py
 	@scripts/tidy.sh $(JOBS)

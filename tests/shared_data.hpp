@@ -6,12 +6,14 @@
 
 #include <gtest/gtest.h>
 
+#include "source_dir.hpp"
+
 namespace revisit::testing_support {
 
 /// Where the real recordings lie: beside the project, or where REVISIT_TEST_DATA says.
 inline std::filesystem::path shared_data() {
   if (const char* folder = std::getenv("REVISIT_TEST_DATA")) return folder;
-  return std::filesystem::path(REVISIT_SOURCE_DIR) / ".." / "shared" / "data";
+  return source_dir() / ".." / "shared" / "data";
 }
 
 /// An empty folder of this test's own.

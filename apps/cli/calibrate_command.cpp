@@ -11,13 +11,13 @@
 namespace revisit::cli {
 namespace {
 
-struct Options {
+struct CalibrateOptions {
   std::string input, out, poses;
   std::size_t scans = 100;
   ParameterFlags parameters;
 };
 
-int calibrate(const Options& options) {
+int calibrate(const CalibrateOptions& options) {
   const auto parameters = options.parameters.resolve();
   if (!parameters) return fail(parameters.error(), kUsage);
   if (const Status status = check_output(options.out, ""); !status) return fail(status.error(), kUsage);
@@ -59,7 +59,7 @@ int calibrate(const Options& options) {
 }  // namespace
 
 Run add_calibrate(CLI::App& program) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateOptions>();
   CLI::App* command = program.add_subcommand(
       "calibrate", "Learn from a recording how intensity falls with distance, and how rings differ.");
   command->footer(

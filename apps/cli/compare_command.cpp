@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 constexpr const char *kOurs = "revisit", *kPaper = "isc-paper";
 
-struct Options {
+struct CompareOptions {
   std::string input, out, poses;
   std::vector<std::string> methods;
   bool overwrite = false;
@@ -42,7 +42,7 @@ std::vector<std::string> method_names() {
   return names;
 }
 
-Result<std::vector<Method>> make_methods(const Options& options, const Parameters& parameters,
+Result<std::vector<Method>> make_methods(const CompareOptions& options, const Parameters& parameters,
                                          const IntensityScale& scale) {
   const auto is_wanted = [&](const std::string& name) {
     return options.methods.empty() ||
@@ -125,7 +125,7 @@ Result<std::size_t> run_all(std::vector<Method>& methods, const Recording& recor
 }
 
 Status evaluate_all(std::vector<Method>& methods, const Recording& recording, const Parameters& parameters,
-                    const Options& options) {
+                    const CompareOptions& options) {
   EvaluationRules rules;
   rules.exclude_frames = parameters.retrieval.exclude_frames;
   rules.exclude_s = parameters.retrieval.exclude_s;
@@ -149,7 +149,7 @@ Status evaluate_all(std::vector<Method>& methods, const Recording& recording, co
   return ok();
 }
 
-int compare(const Options& options) {
+int compare(const CompareOptions& options) {
   auto parameters = options.parameters.resolve();
   if (!parameters) return fail(parameters.error(), kUsage);
   const auto recording = open_input(options.input, options.poses, &*parameters);
@@ -184,7 +184,7 @@ int compare(const Options& options) {
 }  // namespace
 
 Run add_compare(CLI::App& program) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CompareOptions>();
   CLI::App* command =
       program.add_subcommand("compare", "Run several published methods over a recording, side by side.");
   std::string footer =

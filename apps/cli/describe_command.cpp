@@ -12,7 +12,7 @@
 namespace revisit::cli {
 namespace {
 
-struct Options {
+struct DescribeOptions {
   std::string scan, picture, calibration;
   std::optional<std::int64_t> frame;
   ParameterFlags parameters;
@@ -24,7 +24,7 @@ bool is_recording(const std::string& input) {
 }
 
 // The scan in the file, or the one of that frame in the recording.
-Result<Scan> read_input(const Options& options) {
+Result<Scan> read_input(const DescribeOptions& options) {
   if (!is_recording(options.scan)) return read_scan(options.scan, print_log());
   if (!options.frame) return Error{options.scan + ": is a recording; name a scan of it with --frame"};
   const auto recording = open_input(options.scan);
@@ -36,7 +36,7 @@ Result<Scan> read_input(const Options& options) {
                std::to_string((*recording)->frame((*recording)->size() - 1).value)};
 }
 
-int describe(const Options& options) {
+int describe(const DescribeOptions& options) {
   const auto parameters = options.parameters.resolve();
   if (!parameters) return fail(parameters.error(), kUsage);
   const auto calibration = load_calibration(options.calibration);
@@ -66,7 +66,7 @@ int describe(const Options& options) {
 }  // namespace
 
 Run add_describe(CLI::App& program) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DescribeOptions>();
   CLI::App* command =
       program.add_subcommand("describe", "Draw one scan from above and from the side, with its descriptor.");
   command->footer(

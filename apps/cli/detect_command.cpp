@@ -18,7 +18,7 @@
 namespace revisit::cli {
 namespace {
 
-struct Options {
+struct DetectOptions {
   std::string input, out, database, calibration, poses;
   bool overwrite = false, evidence = false;
   ParameterFlags parameters;
@@ -143,7 +143,7 @@ Status write_poses(const std::filesystem::path& folder, const Recording& recordi
   return write_tum_poses(folder / "poses.tum", recording.trajectory());
 }
 
-int detect(const Options& options) {
+int detect(const DetectOptions& options) {
   auto parameters = options.parameters.resolve();
   if (!parameters) return fail(parameters.error(), kUsage);
   const auto calibration = load_calibration(options.calibration);
@@ -209,7 +209,7 @@ int detect(const Options& options) {
 }  // namespace
 
 Run add_detect(CLI::App& program) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DetectOptions>();
   CLI::App* command = program.add_subcommand("detect", "Find the loop closures of a recording.");
   command->footer(
       "Writes into the folder of --out (formats: docs/formats.md):\n"

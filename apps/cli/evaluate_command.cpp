@@ -18,14 +18,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct EvaluateOptions {
   std::string results, reference, recording, calibration;
   std::optional<int> exclude_frames;
   std::optional<double> exclude_s;
 };
 
 // The calibration of a camera that KITTI poses belong to: as named, beside the poses, or the recording's own.
-Result<std::optional<Pose>> find_camera_calibration(const Options& options, const Recording* recording) {
+Result<std::optional<Pose>> find_camera_calibration(const EvaluateOptions& options, const Recording* recording) {
   const fs::path beside = fs::path(options.reference).parent_path() / "calib.txt";
   std::error_code failure;
   const fs::path file = !options.calibration.empty() ? fs::path(options.calibration) : beside;
@@ -42,7 +42,7 @@ Result<std::optional<Pose>> find_camera_calibration(const Options& options, cons
 }
 
 // LiDAR poses of the recording's frames. Without the recording every row of the reference is a frame, 0.1 s apart.
-Result<Trajectory> load_reference(const Options& options, const Recording* recording) {
+Result<Trajectory> load_reference(const EvaluateOptions& options, const Recording* recording) {
   Trajectory all;
   std::error_code failure;
   if (fs::is_directory(options.reference, failure) || fs::path(options.reference).extension() == ".toml") {
@@ -121,7 +121,7 @@ Status judge_trajectories(const fs::path& folder, const Trajectory& reference, E
   return draw_trajectories(folder / "trajectories.png", reference, *before, *after, folder / "tiles");
 }
 
-int evaluate(const Options& options) {
+int evaluate(const EvaluateOptions& options) {
   const fs::path folder = options.results;
   const auto candidates = read_candidates(folder / "candidates.csv");
   if (!candidates) return fail(candidates.error());
@@ -190,7 +190,7 @@ int evaluate(const Options& options) {
 }  // namespace
 
 Run add_evaluate(CLI::App& program) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<EvaluateOptions>();
   CLI::App* command = program.add_subcommand("evaluate", "Score results against reference poses, and draw them.");
   command->footer(
       "Prints table 1 (retrieval), table 2 (loop constraints) and, of `revisit slam`, table 3 (trajectory), and "

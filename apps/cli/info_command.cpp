@@ -14,7 +14,7 @@
 namespace revisit::cli {
 namespace {
 
-struct Options {
+struct InfoOptions {
   std::string input, beside, picture;
   ParameterFlags parameters;
 };
@@ -54,7 +54,7 @@ std::string short_name(const std::string& input) {
 }
 
 // How its scans look on average, and those of another recording beside them.
-int compare(const Recording& recording, const Options& options, const Parameters& parameters) {
+int compare(const Recording& recording, const InfoOptions& options, const Parameters& parameters) {
   std::vector<RecordingStatistics> all;
   const auto own = collect_statistics(recording, short_name(options.input), parameters);
   if (!own) return fail(own.error());
@@ -73,7 +73,7 @@ int compare(const Recording& recording, const Options& options, const Parameters
   return kDone;
 }
 
-int info_of_recording(const Options& options, const Parameters& parameters) {
+int info_of_recording(const InfoOptions& options, const Parameters& parameters) {
   const std::string& folder = options.input;
   const auto opened = open_input(folder);
   if (!opened) return fail(opened.error());
@@ -114,7 +114,7 @@ int info_of_recording(const Options& options, const Parameters& parameters) {
 }  // namespace
 
 Run add_info(CLI::App& program) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<InfoOptions>();
   CLI::App* command = program.add_subcommand(
       "info", "Tell what a recording or a single scan file holds: sensor, rings, rate, intensity, poses.");
   command->footer(

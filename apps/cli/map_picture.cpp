@@ -9,7 +9,7 @@
 namespace revisit::cli {
 namespace {
 
-constexpr int kWidth = 1200, kHeight = 1200;
+constexpr int kSide = 1200;
 constexpr double kMargin = 70.0;
 
 // How many points stand over each pixel of the chart.
@@ -79,8 +79,8 @@ Status draw_map(const std::filesystem::path& file, const std::filesystem::path& 
     y = {std::min(y.min, T.translation().y()), std::max(y.max, T.translation().y())};
   }
   const double border_m = std::max(15.0, 0.05 * std::max(x.max - x.min, y.max - y.min));
-  Canvas canvas(kWidth, kHeight);
-  Chart chart(canvas, {kMargin, 40.0, kWidth - kMargin - 20.0, kHeight - kMargin - 40.0},
+  Canvas canvas(kSide, kSide);
+  Chart chart(canvas, {kMargin, 40.0, kSide - kMargin - 20.0, kSide - kMargin - 40.0},
               {x.min - border_m, x.max + border_m}, {y.min - border_m, y.max + border_m}, true);
   canvas.clip(chart.box());
   if (const Status status = draw_overview(canvas, chart, tiles, Pose::Identity()); !status) return status;

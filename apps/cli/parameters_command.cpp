@@ -9,11 +9,11 @@
 namespace revisit::cli {
 
 Run add_parameters(CLI::App& program) {
-  struct Options {
+  struct ParametersOptions {
     ParameterFlags parameters;
     bool markdown = false;
   };
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ParametersOptions>();
   CLI::App* command = program.add_subcommand(
       "parameters", "Print all parameters as a file for --parameters: of a preset, or as the flags set them.");
   options->parameters.add_to(*command);

@@ -10,13 +10,13 @@
 namespace revisit::cli {
 namespace {
 
-struct Options {
+struct SimulateOptions {
   std::string out;
   int threads = 0;
   ParameterFlags parameters;
 };
 
-int run_simulation(const Options& options) {
+int run_simulation(const SimulateOptions& options) {
   const auto parameters = options.parameters.resolve();
   if (!parameters) return fail(parameters.error(), kUsage);
   const auto recording = simulate(parameters->simulation, print_log(), options.threads);
@@ -44,7 +44,7 @@ int run_simulation(const Options& options) {
 }  // namespace
 
 Run add_simulate(CLI::App& program) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SimulateOptions>();
   CLI::App* command =
       program.add_subcommand("simulate", "Drive a LiDAR through a town or a warehouse, with exact truth.");
   command->footer(

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct SlamOptions {
   std::string input, out, calibration, odometry, wheels;
   double sweep_s = 0.0;
   bool overwrite = false, resume = false, without_map = false;
@@ -29,7 +29,7 @@ struct Options {
 };
 
 // The poses that stand in for, or help, the tracking of scans; empty where there are none.
-Result<Trajectory> other_odometry(const Options& options, const Recording& recording) {
+Result<Trajectory> other_odometry(const SlamOptions& options, const Recording& recording) {
   const std::string& file = options.odometry.empty() ? options.wheels : options.odometry;
   if (file == "none") return Trajectory();
   if (file.empty()) return recording.wheel_odometry();
@@ -54,7 +54,7 @@ Status check_note(MapStore& store, const std::string& name, const std::string& v
 }
 
 // What a map must be gone on with as it was begun.
-std::string parameters_text(const Parameters& parameters, const Options& options) {
+std::string parameters_text(const Parameters& parameters, const SlamOptions& options) {
   std::string text = "odometry=" + options.odometry + " wheels=" + options.wheels +
                      " calibration=" + options.calibration + " sweep=" + std::to_string(options.sweep_s);
   for (const ParameterInfo& info : parameter_infos())
@@ -64,7 +64,7 @@ std::string parameters_text(const Parameters& parameters, const Options& options
   return text;
 }
 
-Result<std::shared_ptr<MapStore>> open_store(const Options& options) {
+Result<std::shared_ptr<MapStore>> open_store(const SlamOptions& options) {
   const fs::path file = fs::path(options.out) / kMapStore;
   std::error_code failure;
   fs::create_directories(options.out, failure);
@@ -170,7 +170,7 @@ Status write_map(const Slam& slam, const MapStore& store, const Parameters& para
   return draw_map(out / "map.png", out / "tiles", slam.graph().nodes());
 }
 
-int slam(const Options& options) {
+int slam(const SlamOptions& options) {
   auto parameters = options.parameters.resolve();
   if (!parameters) return fail(parameters.error(), kUsage);
   if (!options.odometry.empty() && !options.wheels.empty())
@@ -239,7 +239,7 @@ int slam(const Options& options) {
 }  // namespace
 
 Run add_slam(CLI::App& program) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SlamOptions>();
   CLI::App* command = program.add_subcommand("slam", "Turn a recording into a corrected trajectory and a map.");
   command->footer(
       "Scans are tracked against what was seen lately, loops correct what has drifted. Writes into the folder of "

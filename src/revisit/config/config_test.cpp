@@ -6,6 +6,8 @@
 
 #include <revisit/config/parameter_file.hpp>
 
+#include "source_dir.hpp"
+
 namespace revisit {
 namespace {
 
@@ -90,7 +92,7 @@ TEST(ParameterFile, ErrorsNameFileAndLine) {
 }
 
 TEST(ParameterReference, PageInDocsIsUpToDate) {
-  std::ifstream file(std::string(REVISIT_SOURCE_DIR) + "/docs/parameters.md");
+  std::ifstream file(testing_support::source_dir() / "docs" / "parameters.md");
   std::stringstream page;
   page << file.rdbuf();
   EXPECT_EQ(page.str(), parameter_reference_markdown())

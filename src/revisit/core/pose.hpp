@@ -51,13 +51,13 @@ inline Pose planar_pose(double x_m, double y_m, double yaw_rad) {
   return T;
 }
 
-/// The rotation that turns `up` (a unit vector) to z and the heading as little as it can: into a frame that stands
+/// The rotation that turns `up` (a unit vector, not -z) to z and the heading as little as it can: into a frame that stands
 /// upright in the same place. Exactly the identity where up is z.
 inline Pose upright_pose(const Eigen::Vector3f& up) {
   Pose T_upright_lidar = Pose::Identity();
-  if (up != Eigen::Vector3f::UnitZ())
-    T_upright_lidar.linear() =
-        Eigen::Quaterniond::FromTwoVectors(up.cast<double>(), Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const Eigen::Vector3d axis = up.cast<double>().cross(Eigen::Vector3d::UnitZ());  // length: the sine of the tilt
+  if (const double sine = axis.norm(); sine > 0.0)
+    T_upright_lidar.linear() = Eigen::AngleAxisd(std::atan2(sine, up.z()), axis / sine).toRotationMatrix();
   return T_upright_lidar;
 }
 

@@ -8,7 +8,6 @@
 #include <cmath>
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 
 #include <revisit/core/pose.hpp>
 #include <revisit/descriptors/internal/baselines.hpp>
@@ -69,9 +68,11 @@ class M2dp final : public Baseline {
         }
       }
     counts /= static_cast<float>(cloud.cols());
-    const Eigen::BDCSVD<Eigen::MatrixXf> svd(counts, Eigen::ComputeThinU | Eigen::ComputeThinV);
+    // The first left singular vector, and with it the right one.
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXf> squares(counts * counts.transpose());
+    const Eigen::VectorXf left = squares.eigenvectors().col(kPlanes - 1);
     Signature result(kPlanes + kBins, 1);
-    result << svd.matrixU().col(0), svd.matrixV().col(0);
+    result << left, (counts.transpose() * left).normalized();
     // Counts are not negative, so neither are the first singular vectors but for a common sign.
     return result.sum() < 0.f ? Signature(-result) : result;
   }

@@ -11,7 +11,7 @@ namespace {
 // Odometry front ends store ring + time in the field: whole parts of few values, fractions no longer than a sweep, and
 // nearly every reading different. Reflectance repeats itself, or is spread over the whole range between whole numbers.
 constexpr double kShareOfDistinctReadings = 0.5, kShareOfSweepFractions = 0.98;
-constexpr float kLongestSweep_s = 0.25f, kMostRings = 256.f;
+constexpr float kLongestSweep_s = 0.25f, kHighestRing = 256.f;
 constexpr std::size_t kFewestReadings = 1000;  // below that, nothing can be said about repetition
 
 double quantile(std::vector<float>& values, double share) {
@@ -34,7 +34,7 @@ bool looks_like_ring_and_time(const Scan& scan) {
   const auto distinct = std::unique(readings.begin(), readings.end()) - readings.begin();
   return static_cast<double>(distinct) > kShareOfDistinctReadings * points &&
          static_cast<double>(sweep_fractions) > kShareOfSweepFractions * points && lowest >= 0.f && highest > 2.f &&
-         highest < kMostRings;
+         highest < kHighestRing;
 }
 
 }  // namespace

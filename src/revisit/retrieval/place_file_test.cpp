@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-IntensityScanContext random_context(unsigned seed) {
+IntensityScanContext small_context(unsigned seed) {
   DescriptorOptions grid;
   grid.rings = 12;
   grid.sectors = 8;
@@ -30,7 +30,7 @@ class PlaceFile : public testing::Test {
 
   static PlaceIndex filled(int places) {
     PlaceIndex index{options()};
-    for (int i = 0; i < places; ++i) index.add(FrameId{3 * i}, 0.1 * i, random_context(static_cast<unsigned>(i % 700)));
+    for (int i = 0; i < places; ++i) index.add(FrameId{3 * i}, 0.1 * i, small_context(static_cast<unsigned>(i % 700)));
     return index;
   }
   static RetrievalOptions options() {
@@ -70,8 +70,8 @@ TEST_F(PlaceFile, AnswersAsTheIndexThatWasSavedAndGrowsOn) {
     for (int more = 0; more < 2; ++more) {  // as it was, then with another place in each
       ASSERT_EQ(opened->size(), saved.size());
       for (const unsigned seed : {3u, 699u, 5000u}) {
-        const auto expected = *saved.search(FrameId{100000}, 1e6, random_context(seed));
-        const auto found = opened->search(FrameId{100000}, 1e6, random_context(seed));
+        const auto expected = *saved.search(FrameId{100000}, 1e6, small_context(seed));
+        const auto found = opened->search(FrameId{100000}, 1e6, small_context(seed));
         ASSERT_TRUE(found);
         ASSERT_EQ(found->size(), expected.size());
         for (std::size_t i = 0; i < expected.size(); ++i) {
@@ -79,7 +79,7 @@ TEST_F(PlaceFile, AnswersAsTheIndexThatWasSavedAndGrowsOn) {
           EXPECT_EQ((*found)[i].score(), expected[i].score());
         }
       }
-      for (PlaceIndex* index : {&saved, &*opened}) index->add(FrameId{50000 + more}, 1e5, random_context(5000));
+      for (PlaceIndex* index : {&saved, &*opened}) index->add(FrameId{50000 + more}, 1e5, small_context(5000));
     }
     // Saved again over the file it is mapped from.
     ASSERT_TRUE(opened->save(path));
@@ -114,7 +114,7 @@ TEST_F(PlaceFile, AnAlteredImageIsNoticedByTheSearchThatMeetsIt) {
   altered[4096 + 40 * 4096 + 500] ^= 1;  // after the header and the bounds of the first chunk
   const auto index = PlaceIndex::open(written(altered), options());
   ASSERT_TRUE(index) << "images are checked on first use";
-  const auto found = index->search_all(random_context(5));
+  const auto found = index->search_all(small_context(5));
   ASSERT_FALSE(found);
   EXPECT_NE(found.error().message.find("other.places: places 0 to 4095"), std::string::npos) << found.error().message;
   EXPECT_FALSE(index->find(FrameId{0}));

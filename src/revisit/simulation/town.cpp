@@ -9,7 +9,7 @@
 namespace revisit::simulation_internal {
 namespace {
 
-constexpr double kReach_m = 130.0;  // what lies farther from the drive is not built
+constexpr double kBuilt_m = 130.0;  // what lies farther from the drive is not built
 
 // Fills one side of a lane after the other, walking along it.
 class TownBuilder {
@@ -315,7 +315,7 @@ Result<World> build_town(const SimulationOptions& options, const LogSink& log) {
     origin = {first.x, first.y, first.ground_z};
     drive.path = path->moved(-origin);
   }
-  Terrain terrain(drive.path, kReach_m, hills_m, mix(seed, 2));
+  Terrain terrain(drive.path, kBuilt_m, hills_m, mix(seed, 2));
   drive.streets.insert(drive.streets.begin(), drive.path.knots());
   Roads roads(drive.streets, terrain);
   World world{std::move(drive.path), std::move(terrain), std::move(roads), {}, {}, {}, seed, {}, origin};
