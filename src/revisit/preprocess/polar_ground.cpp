@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include <revisit/core/fast_angle.hpp>
+#include <revisit/core/fast_math.hpp>
 #include <revisit/core/pose.hpp>
 #include <revisit/preprocess/internal/polar_ground.hpp>
 

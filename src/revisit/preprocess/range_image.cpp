@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <revisit/core/fast_angle.hpp>
+#include <revisit/core/fast_math.hpp>
 #include <revisit/core/pose.hpp>
 #include <revisit/preprocess/internal/range_image.hpp>
 

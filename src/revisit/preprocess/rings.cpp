@@ -7,7 +7,7 @@
 #include <numeric>
 #include <optional>
 
-#include <revisit/core/fast_angle.hpp>
+#include <revisit/core/fast_math.hpp>
 #include <revisit/core/pose.hpp>
 
 namespace revisit {

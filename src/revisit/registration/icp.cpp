@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_invoke.h>
@@ -60,17 +61,34 @@ Eigen::Matrix3d plane_to_plane(const Eigen::Vector3d& n, const Eigen::Vector3d& 
   return 2.0 * kAcross * covariance.inverse();
 }
 
+// The patches that the points of the source met last: from one step to the next few change, so that only what is nearer
+// needs looking for.
+class Met {
+ public:
+  explicit Met(std::size_t points) : patches_(points) {
+    for (Surface::Patch& each : patches_) each.point.setConstant(std::numeric_limits<float>::infinity());
+  }
+  const Surface::Patch* nearest(const Surface& target, std::size_t i, const Eigen::Vector3f& p, float reach2) {
+    Surface::Patch& patch = patches_[i];
+    const float last2 = (patch.point - p).squaredNorm();
+    return target.nearest_patch(p, std::min(reach2, last2), patch) || last2 < reach2 ? &patch : nullptr;
+  }
+
+ private:
+  std::vector<Surface::Patch> patches_;
+};
+
 // Points [begin, end) of the source in steps of `stride`, at kernel width `width_m`.
 Equations equations_of(const Surface& target, Points source, Points source_normals, std::size_t begin, std::size_t end,
-                       std::size_t stride, double width_m, double reach_m, const Pose& T) {
+                       std::size_t stride, double width_m, double reach_m, const Pose& T, Met& met) {
   Equations sum;
   const auto reach2 = static_cast<float>(reach_m * reach_m);
   const double shrink = width_m * width_m / 4.0;
   for (std::size_t i = (begin + stride - 1) / stride * stride; i < end; i += stride) {
     const Eigen::Vector3d p = T * source[i].cast<double>();
-    Surface::Patch patch;
-    if (!target.nearest_patch(p.cast<float>(), reach2, patch)) continue;
-    const Eigen::Vector3d n = patch.normal.cast<double>(), d = p - patch.point.cast<double>();
+    const Surface::Patch* patch = met.nearest(target, i, p.cast<float>(), reach2);
+    if (patch == nullptr) continue;
+    const Eigen::Vector3d n = patch->normal.cast<double>(), d = p - patch->point.cast<double>();
     if (n.squaredNorm() < 0.5) continue;
     if (source_normals.empty()) {
       Vector6 J;
@@ -116,7 +134,7 @@ Vector6 seen_part(const Vector6& xi, const Equations& sum, double least_seen) {
 }
 
 // One Gauss-Newton step; false where the points do not fix the pose.
-bool step(const Surface& target, Points source, const IcpOptions& options, double width_m, IcpResult& result,
+bool step(const Surface& target, Points source, const IcpOptions& options, double width_m, Met& met, IcpResult& result,
           double& moved) {
   Pose& T = result.T_target_source;
   // While the kernel is wide, some of the points show the way as well as all.
@@ -127,7 +145,7 @@ bool step(const Surface& target, Points source, const IcpOptions& options, doubl
       tbb::blocked_range<std::size_t>(0, source.size(), kPointsATask * stride), Equations{},
       [&](const tbb::blocked_range<std::size_t>& range, Equations part) {
         part.add(equations_of(target, source, options.source_normals, range.begin(), range.end(), stride, width_m,
-                              std::max(width_m, options.least_reach_m), T));
+                              std::max(width_m, options.least_reach_m), T, met));
         return part;
       },
       [](Equations a, const Equations& b) {
@@ -218,10 +236,11 @@ IcpResult align_icp(const Surface& target, std::span<const Eigen::Vector3f> sour
   result.T_target_source = T_guess_target_source;
   constexpr double kShrink = 0.7, kSteady = 0.03, kToAndFro_m = 0.01;
   double width_m = options.coarse_m;
+  Met met(source.size());
   for (; result.iterations < options.most_iterations; ++result.iterations) {
     double moved = 0.0;
     result.converged = false;
-    if (!step(target, source, options, width_m, result, moved)) break;
+    if (!step(target, source, options, width_m, met, result, moved)) break;
     result.last_step_m = moved;
     const bool fine = width_m <= options.fine_m;
     if (fine && result.matched < options.least_matched) break;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include <revisit/core/fast_angle.hpp>
+#include <revisit/core/fast_math.hpp>
 #include <revisit/core/pose.hpp>
 
 namespace revisit {
@@ -18,7 +18,8 @@ constexpr auto kCellsARad = static_cast<float>(kAzimuths / (2.0 * kPi));
 float in_cells(float y, float x, float offset_rad) {
   constexpr float kNear = 1e-3f;  // cells; more than the quick one may be off
   const float quick = (approximate_atan2(y, x) + offset_rad) * kCellsARad;
-  return std::abs(quick - std::round(quick)) > kNear ? quick : (std::atan2(y, x) + offset_rad) * kCellsARad;
+  const float within = quick - static_cast<float>(floor_to_int(quick));
+  return within > kNear && within < 1.f - kNear ? quick : (std::atan2(y, x) + offset_rad) * kCellsARad;
 }
 
 std::optional<std::size_t> cell_of(float x, float y, float z) {

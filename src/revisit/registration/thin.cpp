@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 
 #include <oneapi/tbb/parallel_invoke.h>
 
+#include <revisit/core/fast_math.hpp>
 #include <revisit/registration/surface_cloud.hpp>
 
 namespace revisit {
@@ -13,21 +13,18 @@ namespace {
 // Cells along an axis; what lies farther out shares the outermost one.
 class Axis {
  public:
-  explicit Axis(float cell_m) : per_m_(1.f / cell_m) {}
-  void include(float metres) {
-    first_ = std::min(first_, absolute(metres));
-    last_ = std::max(last_, absolute(metres));
-  }
-  std::size_t cell(float metres) const { return static_cast<std::size_t>(absolute(metres) - first_); }
-  std::size_t cells() const { return static_cast<std::size_t>(last_) - static_cast<std::size_t>(first_) + 1; }
+  Axis(float cell_m, float lowest_m, float highest_m)
+      : per_m_(1.f / cell_m), first_(absolute(lowest_m)), last_(absolute(highest_m)) {}
+  std::uint32_t cell(float metres) const { return static_cast<std::uint32_t>(absolute(metres) - first_); }
+  std::uint32_t cells() const { return static_cast<std::uint32_t>(last_ - first_ + 1); }
 
  private:
   int absolute(float metres) const {
     constexpr float kFarthest = 1024.f;
-    return static_cast<int>(std::floor(std::clamp(metres * per_m_, -kFarthest, kFarthest)));
+    return floor_to_int(std::clamp(metres * per_m_, -kFarthest, kFarthest));
   }
   float per_m_;
-  int first_ = 2000, last_ = -2000;
+  int first_, last_;
 };
 
 struct Voxel {
@@ -54,22 +51,24 @@ ThinCloud thin_surfaces(std::span<const Point> points, std::span<const std::uint
   ThinCloud cloud;
   cloud.voxel_m = static_cast<float>(voxel_m);
   if (points.empty()) return cloud;
-  Axis x(cloud.voxel_m), y(cloud.voxel_m), z(cloud.voxel_m);
+  Eigen::Array4f lowest = Eigen::Array4f::Map(&points[0].x), highest = lowest;
   for (const Point& p : points) {
-    x.include(p.x);
-    y.include(p.y);
-    z.include(p.z);
+    const auto xyz = Eigen::Array4f::Map(&p.x);
+    lowest = lowest.min(xyz);
+    highest = highest.max(xyz);
   }
+  const auto axis = [&](int i) { return Axis(cloud.voxel_m, lowest[i], highest[i]); };
+  const Axis x = axis(0), y = axis(1), z = axis(2);
   // Points are sorted by vertical columns (counting sort), then gathered by height, a column at a time.
-  std::vector<std::uint32_t> begin(x.cells() * y.cells() + 1);
-  const auto column_of = [&](const Point& p) { return x.cell(p.x) * y.cells() + y.cell(p.y); };
-  for (const Point& p : points) ++begin[column_of(p) + 1];
+  std::vector<std::uint32_t> column_of(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) column_of[i] = x.cell(points[i].x) * y.cells() + y.cell(points[i].y);
+  std::vector<std::uint32_t> begin(std::size_t{x.cells()} * y.cells() + 1);
+  for (const std::uint32_t c : column_of) ++begin[c + 1];
   for (std::size_t c = 1; c < begin.size(); ++c) begin[c] += begin[c - 1];
   std::vector<std::uint32_t> sorted(points.size());
   {
     std::vector<std::uint32_t> next(begin.begin(), begin.end() - 1);
-    for (std::size_t i = 0; i < points.size(); ++i)
-      sorted[next[column_of(points[i])]++] = static_cast<std::uint32_t>(i);
+    for (std::size_t i = 0; i < points.size(); ++i) sorted[next[column_of[i]]++] = static_cast<std::uint32_t>(i);
   }
   std::vector<Voxel> column(z.cells());
   std::vector<std::size_t> heights;

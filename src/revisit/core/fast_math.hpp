@@ -5,6 +5,12 @@
 
 namespace revisit {
 
+/// The whole number at or below, exactly; for |value| < 2^31. std::floor is a call where the processor is not known.
+inline int floor_to_int(float value) {
+  const int truncated = static_cast<int>(value);
+  return truncated - static_cast<int>(value < static_cast<float>(truncated));
+}
+
 /// atan2 within 2e-5 rad, in [-pi, pi]: enough to choose a column, a ring or a cell. Without branches, so that
 /// compilers turn loops over it into SIMD.
 inline float approximate_atan2(float y, float x) {
