@@ -36,7 +36,9 @@ endfunction()
 
 add_library(revisit_flags INTERFACE)
 target_compile_options(revisit_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
-  -Wno-restrict)  # GCC 12 warns of its own std::string
+  -Wno-restrict  # GCC 12 warns of its own std::string
+  # Nobody reads errno or flags of floating point: loops with roots and conditions become SIMD. No value changes.
+  -fno-math-errno -fno-trapping-math)
 # Highway's target for processors that count bits in whole vectors (VPOPCNTDQ), the same for every file that chooses.
 target_compile_definitions(revisit_flags INTERFACE HWY_WANT_AVX3_DL)
 if(REVISIT_SANITIZE)

@@ -93,10 +93,11 @@ Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const
   prepared.ms.intensity = watch.lap_ms();
 
   prepared.ground_z_m = ground_below_sensor_m(prepared.scan.points, prepared.ground.is_ground);
-  prepared.descriptor =
-      describe(parameters.preprocess.remove_ground ? above_ground(prepared.scan, prepared.ground.is_ground)
-                                                   : prepared.scan.points,
-               parameters.descriptor, prepared.ground_z_m);
+  std::vector<Point> standing;
+  std::span<const Point> described = prepared.scan.points;
+  if (parameters.preprocess.remove_ground)
+    described = standing = above_ground(prepared.scan, prepared.ground.is_ground);
+  prepared.descriptor = describe(described, parameters.descriptor, prepared.ground_z_m);
   prepared.ms.describe = watch.lap_ms();
   if (prepared.descriptor.occupied_cells() < parameters.descriptor.min_occupied_cells)
     return Error{"frame " + std::to_string(prepared.scan.frame.value) + ": " +

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/preprocess/ground.hpp>
 
-#include <array>
 #include <cmath>
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
 
 #include <revisit/core/pose.hpp>
 #include <revisit/preprocess/internal/polar_ground.hpp>
@@ -15,63 +17,68 @@ using preprocess_internal::RangeImage;
 
 // LeGO-LOAM's vertical test: the line between two returns of neighbouring rings rises at most by the slope. Only
 // returns from below the sensor can be on the ground.
-std::vector<std::uint8_t> label_pixels(const Scan& scan, const RangeImage& image, double slope_deg) {
+std::vector<std::uint8_t> label_pixels(const RangeImage& image, double slope_deg) {
   const float tan2 = static_cast<float>(std::pow(std::tan(to_radians(slope_deg)), 2));
-  std::vector<std::uint8_t> labels(image.point_at.size(), 0);
-  const auto is_level = [&](std::int32_t a, std::int32_t b) {
-    const Point& p = scan.points[static_cast<std::size_t>(a)];
-    const Point& q = scan.points[static_cast<std::size_t>(b)];
+  std::vector<std::uint8_t> labels(image.pixels.size(), 0);
+  const auto is_level = [&](const RangeImage::Pixel& p, const RangeImage::Pixel& q) {
     const float dx = p.x - q.x, dy = p.y - q.y, dz = p.z - q.z;
     return dz * dz <= tan2 * (dx * dx + dy * dy);
   };
-  for (std::size_t row = 0; row + 1 < image.rows; ++row) {
-    for (std::size_t column = 0; column < image.columns; ++column) {
-      const std::size_t lower = row * image.columns + column;
-      const std::int32_t a = image.point_at[lower];
-      if (a == RangeImage::kEmpty || scan.points[static_cast<std::size_t>(a)].z >= 0.f) continue;
-      // A single lost return must not end the ground: one missing row is bridged.
-      for (std::size_t step = 1; step <= 2 && row + step < image.rows; ++step) {
-        const std::size_t upper = lower + step * image.columns;
-        const std::int32_t b = image.point_at[upper];
-        if (b == RangeImage::kEmpty) continue;
-        if (is_level(a, b)) labels[lower] = labels[upper] = 1;
-        break;
+  // A column knows nothing of the others.
+  constexpr std::size_t kColumnsATask = 256;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, image.columns, kColumnsATask), [&](const auto& columns) {
+    for (std::size_t row = 0; row + 1 < image.rows; ++row) {
+      for (std::size_t column = columns.begin(); column < columns.end(); ++column) {
+        const std::size_t lower = row * image.columns + column;
+        const RangeImage::Pixel& p = image.pixels[lower];
+        if (p.is_empty() || p.z >= 0.f) continue;
+        // A single lost return must not end the ground: one missing row is bridged.
+        for (std::size_t step = 1; step <= 2 && row + step < image.rows; ++step) {
+          const std::size_t upper = lower + step * image.columns;
+          if (image.pixels[upper].is_empty()) continue;
+          if (is_level(p, image.pixels[upper])) labels[lower] = labels[upper] = 1;
+          break;
+        }
       }
     }
-  }
+  });
   return labels;
 }
 
 // Ground is large: patches of few pixels (car roofs, bonnets, ledges) lose their label. Neighbours belong together
 // unless a step in height parts them.
-void remove_small_segments(const Scan& scan, const RangeImage& image, int fewest, std::vector<std::uint8_t>& labels) {
+void remove_small_segments(const RangeImage& image, int fewest, std::vector<std::uint8_t>& labels) {
   constexpr float kStep_m = 0.3f;
   constexpr std::uint8_t kGround = 1, kDone = 2;
-  const auto rows = static_cast<std::int32_t>(image.rows), columns = static_cast<std::int32_t>(image.columns);
-  const auto height = [&](std::int32_t pixel) {
-    return scan.points[static_cast<std::size_t>(image.point_at[static_cast<std::size_t>(pixel)])].z;
+  struct At {
+    std::uint32_t pixel, column;
   };
-  std::vector<std::int32_t> segment;
+  const auto columns = static_cast<std::uint32_t>(image.columns), count = static_cast<std::uint32_t>(labels.size());
+  std::vector<At> segment;
   segment.reserve(labels.size());
-  for (std::int32_t seed = 0; seed < rows * columns; ++seed) {
-    if (labels[static_cast<std::size_t>(seed)] != kGround) continue;
-    segment.assign(1, seed);
-    labels[static_cast<std::size_t>(seed)] = kDone;
-    for (std::size_t next = 0; next < segment.size(); ++next) {
-      const std::int32_t pixel = segment[next], row = pixel / columns, column = pixel % columns;
-      const std::array<std::int32_t, 4> neighbours = {
-          row > 0 ? pixel - columns : -1, row + 1 < rows ? pixel + columns : -1,
-          column > 0 ? pixel - 1 : pixel + columns - 1, column + 1 < columns ? pixel + 1 : pixel - columns + 1};
-      for (const std::int32_t neighbour : neighbours) {
-        if (neighbour < 0 || labels[static_cast<std::size_t>(neighbour)] != kGround) continue;
-        if (std::abs(height(neighbour) - height(pixel)) > kStep_m) continue;
-        labels[static_cast<std::size_t>(neighbour)] = kDone;
-        segment.push_back(neighbour);
+  const auto take = [&](At at) {
+    labels[at.pixel] = kDone;
+    segment.push_back(at);
+  };
+  for (std::uint32_t row = 0; row < count; row += columns)
+    for (std::uint32_t column = 0; column < columns; ++column) {
+      if (labels[row + column] != kGround) continue;
+      segment.clear();
+      take({row + column, column});
+      for (std::size_t next = 0; next < segment.size(); ++next) {
+        const auto [pixel, at] = segment[next];
+        const auto take_if_level = [&, from = pixel](At to) {
+          if (labels[to.pixel] == kGround && std::abs(image.pixels[to.pixel].z - image.pixels[from].z) <= kStep_m)
+            take(to);
+        };
+        if (pixel >= columns) take_if_level({pixel - columns, at});
+        if (pixel + columns < count) take_if_level({pixel + columns, at});
+        take_if_level(at > 0 ? At{pixel - 1, at - 1} : At{pixel + columns - 1, columns - 1});
+        take_if_level(at + 1 < columns ? At{pixel + 1, at + 1} : At{pixel + 1 - columns, 0});
       }
+      if (segment.size() < static_cast<std::size_t>(fewest))
+        for (const At& each : segment) labels[each.pixel] = 0;
     }
-    if (segment.size() < static_cast<std::size_t>(fewest))
-      for (const std::int32_t pixel : segment) labels[static_cast<std::size_t>(pixel)] = 0;
-  }
 }
 
 // Points that share a pixel with a ground point are ground if they are no higher than its roughness.
@@ -82,8 +89,7 @@ std::vector<std::uint8_t> label_points(const Scan& scan, const RangeImage& image
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const auto pixel = static_cast<std::size_t>(image.pixel_of[i]);
     if (labels[pixel] == 0) continue;
-    const auto nearest = static_cast<std::size_t>(image.point_at[pixel]);
-    is_ground[i] = scan.points[i].z - scan.points[nearest].z < kThickness_m;
+    is_ground[i] = scan.points[i].z - image.pixels[pixel].z < kThickness_m;
   }
   return is_ground;
 }
@@ -99,8 +105,8 @@ GroundSegmentation segment_ground(const Scan& scan, const Rings& rings, const Pr
     return result;
   }
   const RangeImage image = preprocess_internal::make_range_image(scan, rings);
-  std::vector<std::uint8_t> labels = label_pixels(scan, image, options.ground_slope_deg);
-  remove_small_segments(scan, image, options.ground_min_segment_points, labels);
+  std::vector<std::uint8_t> labels = label_pixels(image, options.ground_slope_deg);
+  remove_small_segments(image, options.ground_min_segment_points, labels);
   result.is_ground = label_points(scan, image, labels);
   return result;
 }

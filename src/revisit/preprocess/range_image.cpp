@@ -16,7 +16,7 @@ RangeImage make_range_image(const Scan& scan, const Rings& rings) {
   for (const std::uint16_t ring : rings.of_point) ++ring_sizes[ring];
   const std::size_t fullest = image.rows == 0 ? 0 : *std::max_element(ring_sizes.begin(), ring_sizes.end());
   image.columns = std::clamp<std::size_t>(fullest, 90, 2048);
-  image.point_at.assign(image.rows * image.columns, RangeImage::kEmpty);
+  image.pixels.resize(image.rows * image.columns);
   image.pixel_of.resize(scan.points.size());
   // Columns first, in a loop that becomes SIMD; then the scatter.
   const auto columns_per_rad = static_cast<float>(static_cast<double>(image.columns) / (2.0 * kPi));
@@ -26,15 +26,12 @@ RangeImage make_range_image(const Scan& scan, const Rings& rings) {
     const auto column = static_cast<std::int32_t>(turned * columns_per_rad);
     image.pixel_of[i] = column < last_column ? column : last_column;
   }
-  const auto range2 = [&](std::int32_t i) {
-    const Point& p = scan.points[static_cast<std::size_t>(i)];
-    return p.x * p.x + p.y * p.y + p.z * p.z;
-  };
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     image.pixel_of[i] += static_cast<std::int32_t>(rings.of_point[i] * image.columns);
-    std::int32_t& slot = image.point_at[static_cast<std::size_t>(image.pixel_of[i])];
-    const auto index = static_cast<std::int32_t>(i);
-    if (slot == RangeImage::kEmpty || range2(index) < range2(slot)) slot = index;
+    RangeImage::Pixel& pixel = image.pixels[static_cast<std::size_t>(image.pixel_of[i])];
+    const Point& p = scan.points[i];
+    const float range2 = p.x * p.x + p.y * p.y + p.z * p.z;
+    if (range2 < pixel.squared_range_m2) pixel = {p.x, p.y, p.z, range2};
   }
   return image;
 }

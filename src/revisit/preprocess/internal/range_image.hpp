@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include <revisit/core/scan.hpp>
@@ -9,14 +10,17 @@
 
 namespace revisit::preprocess_internal {
 
-/// The scan as an image: row = ring from the lowest, column = azimuth. Each pixel names the nearest of its points.
+/// The scan as an image: row = ring from the lowest, column = azimuth. A pixel holds the nearest of its points.
 struct RangeImage {
-  static constexpr std::int32_t kEmpty = -1;
-  std::size_t rows = 0, columns = 0;
-  std::vector<std::int32_t> point_at;  ///< [row * columns + column], kEmpty where there was no return
-  std::vector<std::int32_t> pixel_of;  ///< one a point
+  struct Pixel {
+    float x = 0.f, y = 0.f, z = 0.f;
+    float squared_range_m2 = std::numeric_limits<float>::infinity();  ///< infinite where there was no return
 
-  std::int32_t at(std::size_t row, std::size_t column) const { return point_at[row * columns + column]; }
+    bool is_empty() const { return squared_range_m2 == std::numeric_limits<float>::infinity(); }
+  };
+  std::size_t rows = 0, columns = 0;
+  std::vector<Pixel> pixels;           ///< [row * columns + column]
+  std::vector<std::int32_t> pixel_of;  ///< one a point
 };
 
 RangeImage make_range_image(const Scan& scan, const Rings& rings);
