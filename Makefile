@@ -38,13 +38,13 @@ SOURCES = $(shell git ls-files '*.cpp' '*.hpp' '*.h')
 lint: packages
 	@scripts/install_packages.sh clang-format clang-tidy
 	@cmake --preset debug --log-level=NOTICE > /dev/null
-	clang-format --dry-run --Werror $(SOURCES)
+	@clang-format --dry-run --Werror $(SOURCES)
 	python3 scripts/check_layers.py
 	@scripts/tidy.sh $(JOBS)
 
 format:
 	@scripts/install_packages.sh clang-format
-	clang-format -i $(SOURCES)
+	@clang-format -i $(SOURCES)
 
 clean:
 	rm -rf build out

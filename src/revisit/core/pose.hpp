@@ -51,8 +51,8 @@ inline Pose planar_pose(double x_m, double y_m, double yaw_rad) {
   return T;
 }
 
-/// The rotation that turns `up` (a unit vector, not -z) to z and the heading as little as it can: into a frame that stands
-/// upright in the same place. Exactly the identity where up is z.
+/// The rotation that turns `up` (of unit length, not -z) to z and the heading as little as it can: into a frame that
+/// stands upright in the same place. Exactly the identity where up is z.
 inline Pose upright_pose(const Eigen::Vector3f& up) {
   Pose T_upright_lidar = Pose::Identity();
   const Eigen::Vector3d axis = up.cast<double>().cross(Eigen::Vector3d::UnitZ());  // length: the sine of the tilt
