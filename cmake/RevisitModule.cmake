@@ -31,7 +31,11 @@ function(revisit_test name)
   set_target_properties(${name} PROPERTIES UNITY_BUILD ON)  # GoogleTest and Eigen, read once
   target_link_libraries(${name} PRIVATE ${T_LIBRARIES} revisit_flags revisit_source_dir GTest::gtest GTest::gtest_main)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT 120)
+  set(longest_s 120)
+  if(REVISIT_SANITIZE)
+    set(longest_s 480)  # the slowest takes 53
+  endif()
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT ${longest_s})
 endfunction()
 
 add_library(revisit_flags INTERFACE)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <revisit/core/fast_math.hpp>
 #include <revisit/core/intensity_calibration.hpp>
 #include <revisit/core/log.hpp>
 #include <revisit/core/loop.hpp>
@@ -24,6 +25,25 @@ TEST(WrapAngle, StaysInHalfOpenTurn) {
   EXPECT_NEAR(wrap_angle(-kPi), -kPi, 1e-12);
   EXPECT_NEAR(wrap_angle(0.25 - 4 * kPi), 0.25, 1e-12);
   EXPECT_NEAR(to_degrees(to_radians(33.0)), 33.0, 1e-12);
+}
+
+TEST(FastMath, EqualsTheLibrary) {
+  for (const float value : {-1e6f, -2.5f, -2.f, -1e-20f, -0.f, 0.f, 1e-20f, 0.99999994f, 1.f, 7.5f, 1e6f})
+    EXPECT_EQ(floor_to_int(value), static_cast<int>(std::floor(value))) << value;
+  for (int i = 0; i < 720; ++i) {
+    const double angle = to_radians(0.5 * i - 180.0);
+    const auto y = static_cast<float>(7.0 * std::sin(angle)), x = static_cast<float>(7.0 * std::cos(angle));
+    EXPECT_NEAR(approximate_atan2(y, x), std::atan2(y, x), 2e-5) << angle;
+  }
+}
+
+TEST(UprightPose, TurnsUpToZAndNothingWhereItIsZ) {
+  EXPECT_TRUE(upright_pose(Eigen::Vector3f::UnitZ()).linear().isIdentity(0.0));
+  const Eigen::Vector3f up = Eigen::Vector3f(0.3f, -0.5f, 0.8f).normalized();
+  const Pose T_upright_lidar = upright_pose(up);
+  EXPECT_TRUE((T_upright_lidar * up.cast<double>()).isApprox(Eigen::Vector3d::UnitZ(), 1e-6));
+  EXPECT_TRUE(T_upright_lidar.linear().isUnitary(1e-9));
+  EXPECT_NEAR(rotation_angle(T_upright_lidar), std::acos(static_cast<double>(up.z())), 1e-6) << "no more than needed";
 }
 
 TEST(KeepPoints, KeepsRingsAndTimesWithTheirPoints) {
