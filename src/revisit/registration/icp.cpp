@@ -62,16 +62,19 @@ Eigen::Matrix3d plane_to_plane(const Eigen::Vector3d& n, const Eigen::Vector3d& 
 }
 
 // The patches that the points of the source met last: from one step to the next few change, so that only what is nearer
-// needs looking for.
+// needs looking for. One task a point at a time.
 class Met {
  public:
   explicit Met(std::size_t points) : patches_(points) {
     for (Surface::Patch& each : patches_) each.point.setConstant(std::numeric_limits<float>::infinity());
   }
-  const Surface::Patch* nearest(const Surface& target, std::size_t i, const Eigen::Vector3f& p, float reach2) {
+  // The patch nearest to source point `i`, which now lies at `p` in the target's frame; null where none is in reach.
+  const Surface::Patch* nearest(const Surface& target, std::size_t i, const Eigen::Vector3f& p,
+                                float squared_reach_m2) {
     Surface::Patch& patch = patches_[i];
-    const float last2 = (patch.point - p).squaredNorm();
-    return target.nearest_patch(p, std::min(reach2, last2), patch) || last2 < reach2 ? &patch : nullptr;
+    const float last_m2 = (patch.point - p).squaredNorm();
+    const bool is_nearer = target.nearest_patch(p, std::min(squared_reach_m2, last_m2), patch);
+    return is_nearer || last_m2 < squared_reach_m2 ? &patch : nullptr;
   }
 
  private:

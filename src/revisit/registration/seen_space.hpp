@@ -24,9 +24,10 @@ class SeenSpace {
   };
 
   SeenSpace() = default;
+  /// `points` are finite, in the LiDAR's frame.
   explicit SeenSpace(std::span<const Point> points);
 
-  /// `p` in the scan's frame; `margin_m` is what the ranges may be off.
+  /// `p`, finite, in the scan's frame; `margin_m` is what the ranges may be off.
   Verdict look(const Eigen::Vector3f& p, float margin_m) const;
 
   /// Share of the headings in which anything was seen, in [0, 1]; 1 where it is not known what was seen.
