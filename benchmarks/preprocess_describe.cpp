@@ -14,6 +14,7 @@
 #include <revisit/preprocess/intensity.hpp>
 #include <revisit/preprocess/range_filter.hpp>
 #include <revisit/registration/surface_cloud.hpp>
+#include <revisit/verification/geometric.hpp>
 
 #include "synthetic_world.hpp"
 
@@ -126,7 +127,7 @@ void ground_segmentation_plain(benchmark::State& state) {
         const Point &p = scan.points[static_cast<std::size_t>(a)], &q = scan.points[static_cast<std::size_t>(b)];
         const double angle = std::atan2(static_cast<double>(q.z) - p.z,
                                         std::hypot(static_cast<double>(q.x) - p.x, static_cast<double>(q.y) - p.y));
-        if (std::abs(to_degrees(angle)) <= parameters.preprocess.ground_slope_deg)
+        if (std::abs(to_degrees(angle)) <= GroundConstants::kSlope_deg)
           is_ground[static_cast<std::size_t>(a)] = is_ground[static_cast<std::size_t>(b)] = 1;
       }
     benchmark::DoNotOptimize(is_ground.data());
@@ -136,7 +137,7 @@ void ground_segmentation_plain(benchmark::State& state) {
 
 void thin_for_registration(benchmark::State& state) {
   for (auto _ : state) {
-    const ThinCloud cloud = thin(bench_scan().points, {}, GeometricOptions{}.voxel_m);
+    const ThinCloud cloud = thin(bench_scan().points, {}, LearntWith::kVoxel_m);
     benchmark::DoNotOptimize(cloud.points.data());
   }
   set_counters(state);

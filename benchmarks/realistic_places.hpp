@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <revisit/pipeline/prepare.hpp>
+#include <revisit/pipeline/recording_scale.hpp>
 #include <revisit/preprocess/range_filter.hpp>
 #include <revisit/retrieval/internal/place_store.hpp>
 #include <revisit/simulation/simulated_recording.hpp>
@@ -97,7 +98,7 @@ class RealisticPlaces {
     options.seed = seed;
     const auto drive = simulate(options);
     if (!drive) throw std::runtime_error(drive.error().message);
-    const auto scale = estimate_intensity_scale(**drive, Parameters{});
+    const auto scale = intensity_scale_of(**drive, {});
     if (!scale) throw std::runtime_error(scale.error().message);
     PlaceStore store;
     for (std::size_t i = 0; i < (*drive)->size(); ++i) {

@@ -11,6 +11,7 @@
 #include <pcl/registration/icp.h>
 
 #include <revisit/registration/icp.hpp>
+#include <revisit/registration/surface_cloud.hpp>
 #include <revisit/simulation/simulated_recording.hpp>
 
 namespace {

@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 
+#include <revisit/core/stopwatch.hpp>
 #include <revisit/descriptors/similarity.hpp>
 #include <revisit/io/scan_file.hpp>
 #include <revisit/retrieval/internal/nearest_images.hpp>

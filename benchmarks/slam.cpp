@@ -5,9 +5,9 @@
 
 #include <filesystem>
 
+#include <revisit/pipeline/loop_detector.hpp>
 #include <revisit/pipeline/slam.hpp>
 #include <revisit/preprocess/range_filter.hpp>
-#include <revisit/preprocess/undistort.hpp>
 #include <revisit/simulation/simulated_recording.hpp>
 
 namespace {
@@ -39,27 +39,38 @@ void odometry_alone(benchmark::State& state) {
     Odometry odometry;
     for (Scan scan : all) {
       filter_range(scan, {});
-      if (const auto motion = odometry.expected(scan.stamp_s)) undistort(scan, *motion);
-      benchmark::DoNotOptimize(odometry.track(scan.stamp_s, scan.points));
+      benchmark::DoNotOptimize(odometry.follow(std::move(scan)));
       ++done;
     }
   }
   count(state, done);
 }
 
-// With key frames, loop search, graph and store. The first 200 scans of a recording also learn how intensities agree,
-// which costs some 15 ms each: in steady state it is faster than this.
+// Detection with every scan: odometry, description, search, verification.
+void detection(benchmark::State& state) {
+  const std::vector<Scan>& all = scans();
+  std::size_t done = 0;
+  for (auto _ : state) {
+    LoopDetector detector;
+    for (const Scan& scan : all) {
+      if (!detector.process(scan)) return state.SkipWithError("a scan was refused");
+      ++done;
+    }
+  }
+  count(state, done);
+}
+
+// With key frames, loop search, graph and store.
 void everything(benchmark::State& state) {
   const auto file = std::filesystem::temp_directory_path() / "revisit_bench_slam.sqlite";
-  IntensityScale scale;
-  scale.full_scale = 0.5;
+  SlamSetup setup;
+  setup.scale.emplace().full_scale = 0.5;
   const std::vector<Scan>& all = scans();
   std::size_t done = 0;
   for (auto _ : state) {
     for (const char* ending : {"", "-wal", "-shm"}) std::filesystem::remove(file.string() + ending);
     auto store = MapStore::create(file);
-    auto slam =
-        Slam::start({}, scale, {}, std::make_shared<MapStore>(*std::move(store)), Slam::OdometrySource::kLidar, {});
+    auto slam = Slam::open(std::make_shared<MapStore>(*std::move(store)), {}, setup);
     for (const Scan& scan : all) {
       if (!slam->process(scan)) return state.SkipWithError("a scan was refused");
       ++done;
@@ -71,6 +82,7 @@ void everything(benchmark::State& state) {
 }  // namespace
 
 BENCHMARK(odometry_alone)->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
+BENCHMARK(detection)->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
 BENCHMARK(everything)->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
 
 BENCHMARK_MAIN();

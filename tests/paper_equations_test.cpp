@@ -9,6 +9,7 @@
 #include <revisit/descriptors/similarity.hpp>
 #include <revisit/io/recording.hpp>
 #include <revisit/pipeline/prepare.hpp>
+#include <revisit/pipeline/recording_scale.hpp>
 #include <revisit/verification/temporal.hpp>
 
 #include "random_points.hpp"
@@ -124,7 +125,7 @@ TEST(PaperEquations, HoldOnRealScans) {
   const auto recording = open_recording(shared_data() / "kitti00_mini");
   ASSERT_TRUE(recording);
   const Parameters parameters;
-  const auto scale = estimate_intensity_scale(**recording, parameters);
+  const auto scale = intensity_scale_of(**recording, parameters.intensity);
   std::vector<std::vector<Point>> scans;
   for (const std::size_t index : {18u, 26u}) {  // frames 52 and 4501
     auto scan = (*recording)->read(index);
@@ -149,7 +150,7 @@ TEST(PaperEquations, TemporalConsistencyIsThePrintedMean) {
   const DescriptorLookup lookup = [&](FrameId frame) {
     return past.contains(frame) ? std::optional<DescriptorView>(past.at(frame)) : std::nullopt;
   };
-  const int m = 25, n = 13, N = 5;
+  const int m = 25, n = 13, N = kTemporalPairs;
   for (const int direction : {1, -1}) {  // decided: a reverse visit runs the candidate's index the other way
     double sum = 0.0;
     for (int k = 1; k <= N; ++k) {  // eq. 11
@@ -157,7 +158,7 @@ TEST(PaperEquations, TemporalConsistencyIsThePrintedMean) {
       const auto [phi_g, shift] = geometry_by_the_page(q, c);
       sum += phi_g + intensity_by_the_page(q, c, shift);
     }
-    const TemporalEvidence evidence = check_temporal(FrameId{m}, FrameId{n}, lookup, lookup, TemporalOptions{N, 0.0});
+    const TemporalEvidence evidence = check_temporal(FrameId{m}, FrameId{n}, lookup, lookup, TemporalOptions{});
     EXPECT_NEAR(direction == 1 ? evidence.forward_score : evidence.reverse_score, sum / N, 1e-12);
   }
 }

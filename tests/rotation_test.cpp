@@ -39,7 +39,7 @@ void expect_every_yaw(const Scan& place, const Parameters& parameters, double st
     ASSERT_TRUE(detection) << detection.error().message;
     ASSERT_FALSE(detection->candidates.empty());
     EXPECT_LE(difference_deg(detection->candidates[0].yaw_rad, to_radians(yaw_deg)), reach * column_deg) << yaw_deg;
-    ASSERT_TRUE(detection->loop) << yaw_deg << ": " << detection->reason;
+    ASSERT_TRUE(detection->loop) << yaw_deg << ": " << detection->reason();
     EXPECT_LT(difference_deg(yaw_of(detection->loop->T_match_query), to_radians(yaw_deg)), 0.3) << yaw_deg;
     EXPECT_LT(detection->loop->T_match_query.translation().norm(), 0.1) << yaw_deg;
   }

@@ -89,6 +89,15 @@ Result<std::unique_ptr<Recording>> open_input(const std::string& input, const st
   return std::unique_ptr<Recording>(*std::move(recording));
 }
 
+void use_frames_alone_without_times(const Recording& recording, Parameters& parameters) {
+  if (recording.has_times()) return;
+  print_log()(LogLevel::kInfo,
+              "the recording has no times: 0.1 s a frame is assumed for the motion, and places fewer than " +
+                  std::to_string(parameters.retrieval.exclude_frames) +
+                  " frames before a scan are not searched, whatever their time");
+  parameters.retrieval.exclude_s = 0.0;
+}
+
 Stamps stamps_of(const Recording& recording) {
   Stamps stamps;
   for (std::size_t i = 0; i < recording.size(); ++i) stamps.emplace_back(recording.frame(i), recording.stamp_s(i));

@@ -24,12 +24,9 @@ enum ExitCode : int {
   kDone = 0,
   kFailed = 1,
   kUsage = 2,
-  kDoneWithReservations = 3,  ///< finished, but scans were skipped or the intensity is of no use
+  kDoneWithReservations = 3,  ///< finished, but scans were skipped or not tracked, or the intensity is of no use
   kInterrupted = 130,
 };
-
-/// The map of `revisit slam`, in its folder.
-inline constexpr const char* kMapStore = "map.sqlite";
 
 /// A sub-command registers its flags and, if chosen, is run through the returned function.
 using Run = std::function<int()>;
@@ -62,6 +59,9 @@ class ParameterFlags {
 /// options then stand in `parameters`, if given.
 Result<std::unique_ptr<Recording>> open_input(const std::string& input, const std::string& poses_file = {},
                                               Parameters* parameters = nullptr);
+
+/// What stands for the exclusion of the recent past where the recording has no times: frames alone; said once.
+void use_frames_alone_without_times(const Recording& recording, Parameters& parameters);
 
 /// Frame and time of each scan, s.
 using Stamps = std::vector<std::pair<FrameId, double>>;

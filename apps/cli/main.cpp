@@ -17,8 +17,9 @@ int main(int argc, char** argv) {
       "RECORDING is a KITTI odometry folder, a KITTI raw drive, a folder of .bin, .pcd or .ply scans, or the .toml of "
       "a\n"
       "simulated drive. Without any: revisit simulate --out RECORDING.\n"
-      "Exit code: 0 done, 1 failed, 2 wrong usage, 3 done but with scans skipped or without usable intensity,\n"
-      "130 interrupted (what was computed until then is written).",
+      "Exit code: 0 done, 1 failed, 2 wrong usage, 3 done but with scans skipped, scans not tracked (slam; named at "
+      "the\n"
+      "end) or without usable intensity, 130 interrupted (what was computed until then is written).",
       "revisit");
   program.set_version_flag("--version", REVISIT_VERSION);
   program.require_subcommand(1);

@@ -23,7 +23,7 @@ int main() {
       std::printf("%s\n", detection.error().message.c_str());
       return 1;
     }
-    std::printf("frame %d: %s\n", frame, detection->loop ? "a loop" : detection->reason.c_str());
+    std::printf("frame %d: %s\n", frame, detection->loop ? "a loop" : detection->reason().c_str());
     if (frame == 1000) return detection->loop ? 0 : 1;
   }
   return 1;

@@ -33,7 +33,8 @@ TEST(Parameters, PaperPresetIsTheTableOfThePaper) {
   EXPECT_EQ(p.descriptor.max_range_m, 50.0);
   EXPECT_EQ(p.retrieval.min_geometry_score, 0.9);
   EXPECT_EQ(p.retrieval.min_intensity_score, 0.92);
-  EXPECT_EQ(p.temporal.frames, 5);
+  EXPECT_EQ(p.retrieval.shortlist, 0) << "every place enters the intensity stage";
+  EXPECT_EQ(p.geometric.features, "first");
   EXPECT_EQ(p.temporal.min_score, 1.8);
 }
 
@@ -70,6 +71,20 @@ TEST(Parameters, ContradictionIsNamed) {
   p = {};
   p.descriptor.max_range_m = 100.0;
   EXPECT_NE(validate(p).error().message.find("up to preprocess.max_range_m = 80"), std::string::npos);
+}
+
+TEST(Parameters, AreFewBesidesTheSimulators) {
+  std::size_t count = 0;
+  for (const auto& info : parameter_infos()) count += !info.name.starts_with("simulation.");
+  EXPECT_LE(count, 25u);
+}
+
+TEST(Parameters, AChoiceIsOneOfThoseNamed) {
+  Parameters p;
+  EXPECT_TRUE(set_parameter(p, "geometric.features", "fallback"));
+  for (const char* wrong : {"always", "", "never, first", "fall"})
+    EXPECT_EQ(set_parameter(p, "geometric.features", wrong).error().message,
+              "geometric.features = " + std::string(wrong) + " is not allowed; allowed: never, fallback, first");
 }
 
 TEST(ParameterFile, ReadsBackWhatItWrites) {

@@ -20,6 +20,7 @@ struct Entry {
   Field field;
   double min, max;
   std::string help;
+  std::string choices = {};  ///< of a text: separated by ", "; empty: any
 };
 
 #define REVISIT_FIELD(type, section, field) \
@@ -33,6 +34,8 @@ struct Entry {
 
 #define REVISIT_TEXT(section, field, help) \
   Entry { #section "." #field, REVISIT_FIELD(std::string, section, field), 0, 0, help }
+#define REVISIT_CHOICE(section, field, choices, help) \
+  Entry { #section "." #field, REVISIT_FIELD(std::string, section, field), 0, 0, help, choices }
 
 // The one table from which flags, file format, validation and reference page are made.
 const std::vector<Entry>& table() {
@@ -40,63 +43,40 @@ const std::vector<Entry>& table() {
       REVISIT_REAL(preprocess, min_range_m, 0, 20, "nearer returns are dropped: they are the vehicle itself"),
       REVISIT_REAL(preprocess, max_range_m, 5, 500, "farther returns are dropped: noise grows with distance"),
       REVISIT_SWITCH(preprocess, remove_ground, "describe the scan without its ground"),
-      REVISIT_REAL(preprocess, ground_slope_deg, 1, 45,
-                   "steepest slope between two vertically neighbouring returns that is still ground"),
-      REVISIT_INTEGER(preprocess, ground_min_segment_points, 1, 100000,
-                      "flat patches of fewer points (car roofs) are not ground"),
-      REVISIT_REAL(intensity, full_scale, 0, 1e9, "raw intensity that becomes 1; 0 finds it from the recording"),
-      REVISIT_REAL(intensity, full_scale_quantile, 0.5, 1,
-                   "share of the readings at or below full scale, where it is found from the recording"),
+      REVISIT_REAL(intensity, full_scale, 0, 1e9, "raw intensity that becomes 1; 0 finds it from the first scans"),
       REVISIT_INTEGER(descriptor, rings, 1, 512, "N_r, radial bins of the polar grid"),
       REVISIT_INTEGER(descriptor, sectors, 1, 720, "N_s, azimuthal bins of the polar grid"),
       REVISIT_INTEGER(
           descriptor, levels, 0, 8,
           "layers of the binary image, each of what stands higher above the ground; 0 makes one of all points"),
-      REVISIT_REAL(descriptor, lowest_level_m, -10, 50, "height above the ground of the lowest layer"),
-      REVISIT_REAL(descriptor, level_step_m, 0.1, 50, "height from layer to layer"),
       REVISIT_REAL(descriptor, max_range_m, 1, 500, "L_max, outer radius of the polar grid"),
-      REVISIT_INTEGER(descriptor, min_occupied_cells, 1, 100000, "a scan with fewer occupied cells describes no place"),
       REVISIT_INTEGER(retrieval, top_k, 1, 1000, "candidates returned for a query, best first"),
-      REVISIT_INTEGER(retrieval, separation_frames, 0, 100000,
-                      "of candidates so few frames apart only the best is returned"),
       REVISIT_REAL(retrieval, intensity_weight, 0, 1, "weight of the intensity score beside the geometry score"),
-      REVISIT_INTEGER(retrieval, shortlist, 0, 10000000,
-                      "places of best geometry score that enter the intensity stage; 0 lets all in"),
       REVISIT_REAL(retrieval, min_geometry_score, 0, 1, "epsilon_g, least geometry score of a candidate"),
       REVISIT_REAL(retrieval, min_intensity_score, 0, 1, "epsilon_i, least intensity score of a candidate"),
       REVISIT_INTEGER(retrieval, exclude_frames, 1, 10000000, "places fewer frames before the query are not searched"),
       REVISIT_REAL(retrieval, exclude_s, 0, 1e9, "places fewer seconds before the query are not searched"),
-      REVISIT_INTEGER(temporal, frames, 1, 1000, "N, preceding pairs of frames that are averaged"),
       REVISIT_REAL(temporal, min_score, 0, 2, "xi, least mean of geometry plus intensity score; 0 never refuses"),
-      REVISIT_REAL(geometric, voxel_m, 0.05, 5, "edge of the voxels that thin a scan before registration"),
       REVISIT_INTEGER(geometric, candidates, 1, 1000, "how many of the top-K candidates are registered, best first"),
-      REVISIT_REAL(geometric, min_descriptor_score, 0, 2,
-                   "candidates of lower geometry plus intensity score are not registered"),
       REVISIT_SWITCH(geometric, overhead_search,
                      "find position and heading by laying the scans on each other from overhead before registering"),
-      REVISIT_SWITCH(
-          geometric, follow,
-          "look first where the last loops, and the motion since then, say that the robot is, and trust what "
-          "agrees with them"),
+      REVISIT_SWITCH(geometric, follow,
+                     "test first the place that the last loops and odometry predict, and let them support what agrees"),
       REVISIT_REAL(geometric, min_overlap, 0, 1,
                    "least overlap from overhead, the smaller of both directions, that is worth registering"),
-      REVISIT_SWITCH(geometric, features_first, "register from FPFH features before trying the yaw of the descriptors"),
-      REVISIT_SWITCH(
-          geometric, features_fallback,
-          "register from FPFH features where the yaw of the descriptors gave nothing that is accepted; slow"),
-      REVISIT_REAL(geometric, feature_radius_m, 0.1, 50, "neighbourhood of an FPFH feature"),
-      REVISIT_REAL(geometric, inlier_distance_m, 0.01, 5, "farthest point-to-plane distance of an inlier"),
+      REVISIT_CHOICE(
+          geometric, features, "never, fallback, first",
+          "FPFH features: never; as a fallback where the yaw of the descriptors gave no loop (slow); or first, "
+          "as in the paper"),
       REVISIT_REAL(geometric, min_inlier_ratio, 0, 1,
                    "share of the points above ground, in both directions, that must be inliers"),
       REVISIT_REAL(geometric, min_probability, 0, 1,
                    "least probability that the pose is right, from all evidence together; 0 never refuses"),
-      REVISIT_REAL(geometric, max_translation_m, 0.1, 1000, "a longer relative translation is refused"),
-      REVISIT_REAL(slam, keyframe_distance_m, 0.05, 100, "a key frame at the latest after so far"),
-      REVISIT_REAL(slam, keyframe_angle_deg, 1, 180, "a key frame at the latest after turning so much"),
-      REVISIT_REAL(slam, keyframe_overlap, 0, 1, "a key frame where less of the scan is in view of the last one"),
+      REVISIT_REAL(slam, keyframe_distance_m, 0.05, 100, "a key frame at the latest after so many metres"),
+      REVISIT_REAL(slam, keyframe_angle_deg, 1, 180, "a key frame at the latest after a turn by so much"),
       REVISIT_REAL(slam, map_voxel_m, 0.02, 5, "edge of the voxels of the map: one point each"),
       REVISIT_TEXT(simulation, world, "what is driven through: town or warehouse"),
-      REVISIT_TEXT(simulation, sensor, "what looks about: hdl64e, vlp16, os0-128 or rosette"),
+      REVISIT_TEXT(simulation, sensor, "the sensor: hdl64e, vlp16, os0-128 or rosette"),
       REVISIT_TEXT(simulation, trajectory,
                    "pose file (KITTI, TUM, g2o) to drive along; without, the world has a drive of its own"),
       REVISIT_INTEGER(simulation, seed, 0, 1000000000,
@@ -106,11 +86,12 @@ const std::vector<Entry>& table() {
       REVISIT_REAL(simulation, tilt_deg, 0, 40, "how far a sensor carried by hand leans to and fro, at most"),
       REVISIT_SWITCH(simulation, motion_distortion,
                      "the sensor moves on while it sweeps; false: each scan is taken at once"),
-      REVISIT_REAL(simulation, traffic, 0, 5, "how many vehicles and people move about, as a multiple of the usual"),
+      REVISIT_REAL(simulation, traffic, 0, 5, "how many vehicles and people move about, as a multiple of the default"),
   };
   return entries;
 }
 
+#undef REVISIT_CHOICE
 #undef REVISIT_TEXT
 #undef REVISIT_SWITCH
 #undef REVISIT_INTEGER
@@ -175,7 +156,7 @@ std::vector<ParameterInfo> parameter_infos() {
     infos.push_back({entry.name, entry.help, value_text(entry, defaults), entry.min, entry.max,
                      std::holds_alternative<std::function<bool&(Parameters&)>>(entry.field),
                      std::holds_alternative<std::function<int&(Parameters&)>>(entry.field),
-                     std::holds_alternative<std::function<std::string&(Parameters&)>>(entry.field)});
+                     std::holds_alternative<std::function<std::string&(Parameters&)>>(entry.field), entry.choices});
   return infos;
 }
 
@@ -203,14 +184,12 @@ Result<Parameters> preset(std::string_view name) {
     p.retrieval.shortlist = 0;
     p.retrieval.min_geometry_score = 0.9;
     p.retrieval.min_intensity_score = 0.92;
-    p.temporal.frames = 5;
     p.temporal.min_score = 1.8;
-    p.geometric.min_descriptor_score = 0.0;
     p.geometric.min_inlier_ratio = 0.6;
     p.geometric.min_probability = 0.0;
     p.geometric.overhead_search = false;
     p.geometric.follow = false;
-    p.geometric.features_first = true;
+    p.geometric.features = "first";
     return p;
   }
   std::string known;
@@ -230,6 +209,10 @@ Status set_parameter(Parameters& parameters, std::string_view name, std::string_
     return ok();
   }
   if (const auto* get = std::get_if<std::function<std::string&(Parameters&)>>(&entry->field)) {
+    // Choices stand between ", ": whole ones only.
+    if (!entry->choices.empty() &&
+        (", " + entry->choices + ", ").find(", " + std::string(value) + ", ") == std::string::npos)
+      return refuse(entry->choices);
     (*get)(parameters) = value;
     return ok();
   }
@@ -269,6 +252,11 @@ Status validate(const Parameters& parameters) {
         "descriptor.max_range_m = " + to_text(parameters.descriptor.max_range_m) +
         " is not allowed; allowed: up to preprocess.max_range_m = " + to_text(parameters.preprocess.max_range_m)};
   return ok();
+}
+
+const Parameters& require_valid(const Parameters& parameters) {
+  if (const Status status = validate(parameters); !status) throw std::invalid_argument(status.error().message);
+  return parameters;
 }
 
 }  // namespace revisit

@@ -5,76 +5,62 @@
 #include <string_view>
 #include <vector>
 
+#include <revisit/core/exclusion.hpp>
 #include <revisit/core/result.hpp>
 
 namespace revisit {
 
 /// Range and ground filters in front of the descriptor (paper, section III-A).
 struct PreprocessOptions {
-  double min_range_m = 1.0;            ///< nearer returns are the vehicle itself
-  double max_range_m = 80.0;           ///< farther returns are noise
-  bool remove_ground = false;          ///< describe the scan without its ground
-  double ground_slope_deg = 10.0;      ///< steepest slope between vertical neighbours that is still ground
-  int ground_min_segment_points = 30;  ///< smaller flat patches (car roofs) are not ground
+  double min_range_m = 1.0;    ///< nearer returns are the vehicle itself
+  double max_range_m = 80.0;   ///< farther returns are noise
+  bool remove_ground = false;  ///< describe the scan without its ground
 };
 
 /// How raw intensity becomes [0, 1], decided once a recording.
 struct IntensityOptions {
-  double full_scale = 0.0;            ///< reading that becomes 1; 0 = the quantile below, found from the recording
-  double full_scale_quantile = 0.98;  ///< share of readings at or below full scale
+  double full_scale = 0.0;  ///< reading that becomes 1; 0 finds it from the first scans
 };
 
 /// The polar grid of intensity scan context (paper, section III-B).
 struct DescriptorOptions {
-  int rings = 20;               ///< N_r, radial bins
-  int sectors = 30;             ///< N_s, azimuthal bins
-  int levels = 4;               ///< layers of the image, by height above the ground; 0: one, of all points
-  double lowest_level_m = 0.5;  ///< of the first layer, above the ground
-  double level_step_m = 2.0;    ///< from layer to layer
-  double max_range_m = 80.0;    ///< L_max
-  int min_occupied_cells = 12;  ///< fewer occupied cells describe no place
+  int rings = 20;             ///< N_r, radial bins
+  int sectors = 30;           ///< N_s, azimuthal bins
+  int levels = 4;             ///< layers of the image, by height above the ground; 0: one, of all points
+  double max_range_m = 80.0;  ///< L_max
 };
 
-/// The two search stages (paper, section III-C) and who may be matched (docs/evaluation.md).
-struct RetrievalOptions {
+/// The two search stages (paper, section III-C) and which places may answer (ExclusionRule, docs/evaluation.md).
+struct RetrievalOptions : ExclusionRule {
   int top_k = 20;                    ///< candidates returned, best first
-  int separation_frames = 8;         ///< of places so few frames apart, one is returned
   double intensity_weight = 0.1;     ///< of Phi_i beside Phi_g in the order of candidates; 1 in the paper
-  int shortlist = 200;               ///< places of best geometry score that enter the intensity stage; 0 = all
   double min_geometry_score = 0.0;   ///< epsilon_g
   double min_intensity_score = 0.0;  ///< epsilon_i
-  int exclude_frames = 50;           ///< places fewer frames before the query are not searched
-  double exclude_s = 30.0;           ///< places less time before the query are not searched
+  // No parameters; the preset of the paper does without both.
+  int separation_frames = 8;  ///< of places so few frames apart, one is returned: neighbours say the same
+  int shortlist = 200;        ///< places of best geometry score that enter the intensity stage; 0 = all
 };
 
 /// Temporal consistency (paper, eq. 11).
 struct TemporalOptions {
-  int frames = 5;          ///< N, pairs of preceding frames averaged
   double min_score = 0.0;  ///< xi, on Phi_g + Phi_i; 0 = reported but never refused
 };
 
 /// Geometric consistency (paper, section III-D): from overhead or FPFH, then ICP, then evidence (docs/method.md).
 struct GeometricOptions {
-  double voxel_m = 1.0;               ///< edge of the voxels that thin a scan
-  int candidates = 3;                 ///< how many of the top-K are registered, best first
-  double min_descriptor_score = 0.0;  ///< candidates with a lower Phi_g + Phi_i are not registered
-  bool overhead_search = true;        ///< find position and heading from overhead before registering
-  bool follow = true;                 ///< look first where the last loops and the motion since lead, and trust it more
-  double min_overlap = 0.4;           ///< of both images from overhead; candidates below are not registered
-  bool features_first = false;        ///< start from FPFH, as the paper does, before trying the descriptors' yaw
-  bool features_fallback = false;     ///< try FPFH where the descriptors' yaw gave no accepted registration; slow
-  double feature_radius_m = 3.0;      ///< neighbourhood of FPFH features
-  double inlier_distance_m = 0.4;     ///< farthest point-to-plane distance of an inlier
-  double min_inlier_ratio = 0.4;      ///< share of the points above ground, both ways, that must be inliers
-  double min_probability = 0.95;      ///< that the pose is right (docs/accuracy.md); 0 never refuses
-  double max_translation_m = 15.0;    ///< a longer relative translation is refused
+  int candidates = 3;              ///< how many of the top-K are registered, best first
+  bool overhead_search = true;     ///< find position and heading from overhead before registering
+  bool follow = true;              ///< predict the place from the last loops and odometry, and let these support it
+  double min_overlap = 0.4;        ///< of both images from overhead; candidates below are not registered
+  std::string features = "never";  ///< FPFH: never; fallback, where the yaw gave no loop; first, as the paper
+  double min_inlier_ratio = 0.4;   ///< share of the points above ground, both ways, that must be inliers
+  double min_probability = 0.95;   ///< that the pose is right (docs/accuracy.md); 0 never refuses
 };
 
 /// Trajectory and map (docs/slam.md).
 struct SlamOptions {
-  double keyframe_distance_m = 1.5;  ///< a key frame at the latest after so far
+  double keyframe_distance_m = 1.5;  ///< a key frame at the latest after so much travelled distance
   double keyframe_angle_deg = 20.0;  ///< and after turning so much
-  double keyframe_overlap = 0.5;     ///< and where less of the scan is in view of the last one
   double map_voxel_m = 0.2;          ///< edge of the voxels of the map
 };
 
@@ -88,7 +74,7 @@ struct SimulationOptions {
   int frames = 0;                 ///< the first so many scans; 0: all of the drive
   double tilt_deg = 0.0;          ///< how far a sensor carried by hand leans, at most
   bool motion_distortion = true;  ///< the sensor moves while it sweeps
-  double traffic = 1.0;           ///< how many move about, as a share of the usual
+  double traffic = 1.0;           ///< how many move about, as a multiple of the default
 };
 
 /// Every parameter of the system, at the shipped defaults.
@@ -112,6 +98,7 @@ struct ParameterInfo {
   bool is_switch = false;
   bool is_integer = false;
   bool is_text = false;
+  std::string choices;  ///< of a text that is one of few, separated by commas
 };
 
 /// All parameters in the order of the reference page.
@@ -128,5 +115,7 @@ std::string get_parameter(const Parameters& parameters, std::string_view name);
 
 /// Names the first field that is outside its range.
 Status validate(const Parameters& parameters);
+/// The parameters themselves; throws std::invalid_argument where validate() finds one outside its range.
+const Parameters& require_valid(const Parameters& parameters);
 
 }  // namespace revisit

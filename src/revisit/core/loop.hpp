@@ -27,6 +27,7 @@ struct LoopConstraint {
   double inlier_ratio = 0.0;              ///< the smaller of both directions, [0, 1]
   double rmse_m = 0.0;                    ///< point-to-plane, over the inliers
   double probability = 1.0;               ///< that the pose is right (docs/accuracy.md)
+  double score = 0.0;                     ///< orders loops by confidence, larger is surer (docs/method.md, section 7)
   /// Inverse covariance of xi where the true pose is T_match_query * small_motion(xi): metres, then radians, in the
   /// query's frame. Small along what the scans do not fix: the length of a corridor.
   Matrix6 information = Matrix6::Identity();

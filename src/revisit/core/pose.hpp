@@ -40,6 +40,13 @@ inline Pose small_motion(const Vector6& xi) {
   return T;
 }
 
+/// The same transform with a rotation that is orthonormal to the last bit that rounding allows. Wherever poses are made
+/// from poses, step after step: deviations would grow, by inverses even exponentially.
+inline Pose normalised(Pose T) {
+  T.linear() = Eigen::Quaterniond(T.linear()).normalized().toRotationMatrix();
+  return T;
+}
+
 /// Heading of the x axis seen from above, radians.
 inline double yaw_of(const Pose& T) { return std::atan2(T.linear()(1, 0), T.linear()(0, 0)); }
 

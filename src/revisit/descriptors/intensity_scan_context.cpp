@@ -26,11 +26,10 @@ std::uint8_t quantise_intensity(float intensity) {
 
 Describer::Describer(const DescriptorOptions& options) : options_(options) {
   if (options.rings < 1 || options.rings > 512 || options.sectors < 1 || options.sectors > 720 || options.levels < 0 ||
-      options.levels > 8 || !(options.max_range_m > 0.0) || !(options.level_step_m > 0.0))
+      options.levels > 8 || !(options.max_range_m > 0.0))
     throw std::invalid_argument("descriptor grid " + std::to_string(options.rings) + " x " +
                                 std::to_string(options.sectors) + " x " + std::to_string(options.levels) + ", " +
-                                std::to_string(options.max_range_m) + " m, levels of " +
-                                std::to_string(options.level_step_m) +
+                                std::to_string(options.max_range_m) +
                                 " m; allowed: 1 to 512 rings, 1 to 720 sectors, 0 to 8 levels, more than 0 m");
   cells_.resize(static_cast<std::size_t>(options.rings) * static_cast<std::size_t>(options.sectors) + 1);
   tops_.resize(cells_.size());
@@ -41,8 +40,8 @@ void Describer::describe(std::span<const Point> points, IntensityScanContext& re
   std::fill(tops_.begin(), tops_.end(), std::uint8_t{0});
   descriptors_internal::bin_points(points.data(), points.size(),
                                    {options_.rings, options_.sectors, options_.max_range_m},
-                                   {static_cast<float>(ground_z_m + options_.lowest_level_m),
-                                    static_cast<float>(1.0 / options_.level_step_m), options_.levels},
+                                   {static_cast<float>(ground_z_m + LayerConstants::kLowest_m),
+                                    static_cast<float>(1.0 / LayerConstants::kStep_m), options_.levels},
                                    cells_.data(), tops_.data());
   result.rings = options_.rings;
   result.sectors = options_.sectors;

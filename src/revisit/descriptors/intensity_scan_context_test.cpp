@@ -35,8 +35,6 @@ TEST(Describe, LayersHoldWhatStandsHigher) {
   options.rings = 10;
   options.sectors = 4;
   options.levels = 3;
-  options.lowest_level_m = 0.5;
-  options.level_step_m = 2.0;
   options.max_range_m = 50.0;
   const double ground_z_m = -2.0;  // layers above -1.5, 0.5 and 2.5
   const std::vector<Point> points = {{6.f, 1.f, -1.9f, 0.9f},

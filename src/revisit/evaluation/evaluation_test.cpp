@@ -81,17 +81,17 @@ TEST(RetrievalTable, NoRowsNoRevisits) {
   EXPECT_EQ(table.recall_at_1, 0.0);
 }
 
-LoopRow loop(int query, int match, const Pose& T_match_query) {
-  LoopRow row;
-  row.constraint.query = FrameId{query};
-  row.constraint.match = FrameId{match};
-  row.constraint.T_match_query = T_match_query;
-  return row;
+LoopConstraint loop(int query, int match, const Pose& T_match_query) {
+  LoopConstraint loop;
+  loop.query = FrameId{query};
+  loop.match = FrameId{match};
+  loop.T_match_query = T_match_query;
+  return loop;
 }
 
 TEST(LoopTable, RightWithinHalfAMetreAndThreeDegrees) {
   const Reference reference = there_and_back();
-  const std::vector<LoopRow> rows = {
+  const std::vector<LoopConstraint> rows = {
       loop(150, 49, at(0.4, 0, 180)),  // 0.4 m off
       loop(151, 48, at(0.6, 0, 180)),  // too far
       loop(152, 47, at(0, 0, 176)),    // too much turned

@@ -22,14 +22,13 @@ double share(std::size_t part, std::size_t whole) {
 
 }  // namespace
 
-LoopTable evaluate_loops(const std::vector<LoopRow>& rows, const Reference& reference) {
+LoopTable evaluate_loops(const std::vector<LoopConstraint>& loops, const Reference& reference) {
   LoopTable table;
   table.revisits = reference.revisits().size();
   table.reverse_revisits = reference.reverse_revisits();
   std::vector<double> translations, rotations;
   std::set<FrameId> found, found_reverse;
-  for (const LoopRow& row : rows) {
-    const LoopConstraint& loop = row.constraint;
+  for (const LoopConstraint& loop : loops) {
     const auto T_truth = reference.T_match_query(loop.match, loop.query);
     if (!T_truth) {
       ++table.without_reference;

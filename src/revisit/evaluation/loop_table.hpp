@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include <revisit/core/results.hpp>
+#include <revisit/core/loop.hpp>
 #include <revisit/evaluation/reference.hpp>
 
 namespace revisit {
@@ -27,6 +27,6 @@ struct LoopTable {
   std::vector<JudgedLoop> loops;
 };
 
-LoopTable evaluate_loops(const std::vector<LoopRow>& rows, const Reference& reference);
+LoopTable evaluate_loops(const std::vector<LoopConstraint>& loops, const Reference& reference);
 
 }  // namespace revisit

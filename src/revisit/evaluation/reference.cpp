@@ -8,13 +8,12 @@ namespace revisit {
 
 Reference::Reference(Trajectory trajectory, const EvaluationRules& rules)
     : trajectory_(std::move(trajectory)), rules_(rules) {
-  constexpr double kTimeTolerance_s = 1e-6;
   const double reverse_cosine = std::cos(to_radians(rules_.reverse_heading_deg));
   for (const auto& [query, at] : trajectory_.entries) {
     std::optional<Revisit> nearest;
     for (const auto& [frame, other] : trajectory_.entries) {
       if (query.value - frame.value < rules_.exclude_frames) break;  // frames increase
-      if (at.stamp_s - other.stamp_s < rules_.exclude_s - kTimeTolerance_s) continue;
+      if (!rules_.allows({query, at.stamp_s}, {frame, other.stamp_s})) continue;
       const double distance = (at.T_world_lidar.translation() - other.T_world_lidar.translation()).norm();
       if (distance > rules_.same_place_m || (nearest && distance >= nearest->distance_m)) continue;
       const Eigen::Vector3d heading = at.T_world_lidar.linear().col(0), then = other.T_world_lidar.linear().col(0);

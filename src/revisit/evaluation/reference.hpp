@@ -5,14 +5,13 @@
 #include <optional>
 #include <vector>
 
+#include <revisit/core/exclusion.hpp>
 #include <revisit/core/pose.hpp>
 
 namespace revisit {
 
 /// Who may be matched, and what is the same place (docs/evaluation.md).
-struct EvaluationRules {
-  int exclude_frames = 50;
-  double exclude_s = 30.0;
+struct EvaluationRules : ExclusionRule {
   double same_place_m = 4.0;          ///< 3-D distance of two poses
   double reverse_heading_deg = 90.0;  ///< a revisit whose heading differs by more is a reverse one
   double right_translation_m = 0.5;   ///< of a loop's pose from the reference

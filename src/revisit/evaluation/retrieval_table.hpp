@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include <revisit/core/results.hpp>
+#include <revisit/core/candidate_row.hpp>
 #include <revisit/evaluation/reference.hpp>
 
 namespace revisit {

@@ -99,14 +99,13 @@ Status ResultWriter::add(const CandidateRow& row) {
   return files_->candidates.flush();
 }
 
-Status ResultWriter::add(const LoopRow& row) {
+Status ResultWriter::add(const LoopConstraint& loop) {
   auto& out = files_->loops.stream();
-  const LoopConstraint& loop = row.constraint;
   const Eigen::Vector3d t = loop.T_match_query.translation();
   const Eigen::Quaterniond q = Eigen::Quaterniond(loop.T_match_query.rotation()).normalized();
   out << loop.query.value << ',' << loop.match.value;
   for (const double value :
-       {row.score, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w(), loop.inlier_ratio, loop.rmse_m})
+       {loop.score, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w(), loop.inlier_ratio, loop.rmse_m})
     out << ',' << value;
   out << '\n';
   return files_->loops.flush();
@@ -141,8 +140,8 @@ Result<std::vector<CandidateRow>> read_candidates(const fs::path& file) {
   return rows;
 }
 
-Result<std::vector<LoopRow>> read_loops(const fs::path& file) {
-  std::vector<LoopRow> rows;
+Result<std::vector<LoopConstraint>> read_loops(const fs::path& file) {
+  std::vector<LoopConstraint> rows;
   const Status status = read_csv(file, kLoopHeader, [&](const std::vector<std::string_view>& cells) {
     if (cells.size() != 12) return false;
     const auto query = frame(cells[0]), match = frame(cells[1]);
@@ -154,15 +153,15 @@ Result<std::vector<LoopRow>> read_loops(const fs::path& file) {
     }
     const Eigen::Quaterniond q(v[7], v[4], v[5], v[6]);
     if (!query || !match || std::abs(q.norm() - 1.0) > 1e-2) return false;
-    LoopRow row;
-    row.score = v[0];
-    row.constraint.query = *query;
-    row.constraint.match = *match;
-    row.constraint.T_match_query.linear() = q.normalized().toRotationMatrix();
-    row.constraint.T_match_query.translation() << v[1], v[2], v[3];
-    row.constraint.inlier_ratio = v[8];
-    row.constraint.rmse_m = v[9];
-    rows.push_back(row);
+    LoopConstraint loop;
+    loop.score = v[0];
+    loop.query = *query;
+    loop.match = *match;
+    loop.T_match_query.linear() = q.normalized().toRotationMatrix();
+    loop.T_match_query.translation() << v[1], v[2], v[3];
+    loop.inlier_ratio = v[8];
+    loop.rmse_m = v[9];
+    rows.push_back(loop);
     return true;
   });
   if (!status) return status.error();

@@ -5,8 +5,9 @@
 #include <memory>
 #include <vector>
 
+#include <revisit/core/candidate_row.hpp>
+#include <revisit/core/loop.hpp>
 #include <revisit/core/result.hpp>
-#include <revisit/core/results.hpp>
 
 namespace revisit {
 
@@ -21,7 +22,7 @@ class ResultWriter {
   ~ResultWriter();
 
   Status add(const CandidateRow& row);
-  Status add(const LoopRow& row);
+  Status add(const LoopConstraint& loop);
   Status finish();
 
  private:
@@ -32,7 +33,7 @@ class ResultWriter {
 
 /// Read what ResultWriter, or any other program that follows the format, wrote (docs/formats.md).
 Result<std::vector<CandidateRow>> read_candidates(const std::filesystem::path& file);
-Result<std::vector<LoopRow>> read_loops(const std::filesystem::path& file);
+Result<std::vector<LoopConstraint>> read_loops(const std::filesystem::path& file);
 
 /// Writes `text` (a report, JSON) whole; a failure names the file and the reason.
 Status write_text(const std::filesystem::path& file, const std::string& text);

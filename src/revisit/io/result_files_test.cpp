@@ -26,10 +26,10 @@ TEST(ResultFiles, RowsAreCompleteAsSoonAsTheyAreAdded) {
   ASSERT_TRUE(writer) << writer.error().message;
   ASSERT_TRUE(writer->add(CandidateRow{FrameId{70}, FrameId{3}, 0.75, false, "a, b"}));
   ASSERT_TRUE(writer->add(CandidateRow{FrameId{71}, std::nullopt, 0.0, false, "no place like it"}));
-  LoopRow loop;
-  loop.constraint.query = FrameId{70};
-  loop.constraint.match = FrameId{3};
-  loop.constraint.T_match_query.translation() << 1.0, 2.0, 3.0;
+  LoopConstraint loop;
+  loop.query = FrameId{70};
+  loop.match = FrameId{3};
+  loop.T_match_query.translation() << 1.0, 2.0, 3.0;
   loop.score = 1.5;
   ASSERT_TRUE(writer->add(loop));
   EXPECT_EQ(content(folder / "candidates.csv"),
@@ -42,7 +42,7 @@ TEST(ResultFiles, RowsAreCompleteAsSoonAsTheyAreAdded) {
   EXPECT_FALSE((*candidates)[1].match);
   const auto loops = read_loops(folder / "loops.csv");
   ASSERT_TRUE(loops) << loops.error().message;
-  EXPECT_DOUBLE_EQ((*loops)[0].constraint.T_match_query.translation().z(), 3.0);
+  EXPECT_DOUBLE_EQ((*loops)[0].T_match_query.translation().z(), 3.0);
 }
 
 TEST(ResultFiles, ExistingResultsAreKept) {

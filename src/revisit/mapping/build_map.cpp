@@ -16,19 +16,19 @@ namespace {
 
 namespace fs = std::filesystem;
 using mapping_internal::find_moving;
+using mapping_internal::Observer;
 using mapping_internal::one_point_a_voxel;
-using mapping_internal::Onlooker;
-using mapping_internal::RangeImage;
 using mapping_internal::TileFiles;
 using mapping_internal::TileIndex;
+using mapping_internal::VisibilityImage;
 
 // Key frames before and after that say whether a point stayed: soon enough to see it, late enough that it has moved.
-constexpr std::array kOnlookers = {-12, -8, -4, -2, 2, 4, 8, 12};
+constexpr std::array kObservers = {-12, -8, -4, -2, 2, 4, 8, 12};
 constexpr int kReach = 12;
 
 struct Loaded {
   std::vector<Point> points;
-  RangeImage image;
+  VisibilityImage image;
 };
 
 // The key frames around the one at work, each read once.
@@ -43,7 +43,7 @@ class Window {
     while (first_ + loaded_.size() < std::min(count, centre + kReach + 1)) {
       auto points = points_(first_ + loaded_.size());
       if (!points) return points.error();
-      RangeImage image(*points);
+      VisibilityImage image(*points);
       loaded_.push_back({*std::move(points), std::move(image)});
     }
     return ok();
@@ -66,6 +66,32 @@ std::vector<Point> placed(const std::vector<Point>& points, const std::vector<st
     result.push_back({p.x(), p.y(), p.z(), points[i].intensity});
   }
   return result;
+}
+
+enum class Next { kGoOn, kStop };
+
+// Calls `take(points, done)` with the points of each key frame in the world's frame, without what moved.
+template <typename Take>
+Status for_each_keyframe(const MapInput& input, const MapOptions& options, std::size_t& moving, Take take) {
+  Window window(input.points);
+  const auto& poses = input.T_world_keyframes;
+  const std::size_t count = poses.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (const Status status = window.move_to(i, count); !status) return status;
+    const std::vector<Point>& own = window.at(i).points;
+    std::vector<std::uint8_t> is_moving;
+    if (options.thin_moving) {
+      std::vector<Observer> observers;
+      for (const int offset : kObservers)
+        if (const auto j = static_cast<std::int64_t>(i) + offset; j >= 0 && j < static_cast<std::int64_t>(count))
+          if (const auto k = static_cast<std::size_t>(j); !window.at(k).points.empty())
+            observers.push_back({poses[k], &window.at(k).image});
+      is_moving = find_moving(own, poses[i], observers);
+      moving += static_cast<std::size_t>(std::count(is_moving.begin(), is_moving.end(), 1));
+    }
+    if (take(placed(own, is_moving, poses[i]), i + 1) == Next::kStop) return ok();
+  }
+  return ok();
 }
 
 Result<MapTile> write_tile(TileFiles& files, const TileIndex& index, const MapOptions& options, const fs::path& tiles) {
@@ -117,9 +143,23 @@ Status write_index(const fs::path& file, const MapReport& report, const MapOptio
 
 }  // namespace
 
-Result<MapReport> build_map(const std::vector<Pose>& T_world_keyframes,
-                            const std::function<Result<std::vector<Point>>(std::size_t)>& points,
-                            const MapOptions& options, const fs::path& folder,
+Result<std::vector<Point>> collect_map(const MapInput& input, const MapOptions& options) {
+  std::vector<Point> points;
+  std::size_t moving = 0, thin_at = 4'000'000;
+  const Status status = for_each_keyframe(input, options, moving, [&](const std::vector<Point>& placed, std::size_t) {
+    points.insert(points.end(), placed.begin(), placed.end());
+    // Thinned on the way: most of what a key frame sees is in the map already.
+    if (points.size() > thin_at) {
+      points = one_point_a_voxel(points, options.voxel_m);
+      thin_at = std::max(thin_at, 2 * points.size());
+    }
+    return Next::kGoOn;
+  });
+  if (!status) return status.error();
+  return one_point_a_voxel(points, options.voxel_m);
+}
+
+Result<MapReport> build_map(const MapInput& input, const MapOptions& options, const fs::path& folder,
                             const std::function<bool(std::size_t)>& progress) {
   const fs::path tiles = folder / "tiles";
   std::error_code failure;
@@ -129,26 +169,19 @@ Result<MapReport> build_map(const std::vector<Pose>& T_world_keyframes,
 
   MapReport report;
   TileFiles files(tiles, options.tile_m);
-  Window window(points);
-  const std::size_t count = T_world_keyframes.size();
-  for (std::size_t i = 0; i < count; ++i) {
-    if (const Status status = window.move_to(i, count); !status) return status.error();
-    const std::vector<Point>& own = window.at(i).points;
-    std::vector<std::uint8_t> is_moving;
-    if (options.thin_moving) {
-      std::vector<Onlooker> onlookers;
-      for (const int offset : kOnlookers)
-        if (const auto j = static_cast<std::int64_t>(i) + offset; j >= 0 && j < static_cast<std::int64_t>(count))
-          if (const auto k = static_cast<std::size_t>(j); !window.at(k).points.empty())
-            onlookers.push_back({T_world_keyframes[k], &window.at(k).image});
-      is_moving = find_moving(own, T_world_keyframes[i], onlookers);
-      report.moving += static_cast<std::size_t>(std::count(is_moving.begin(), is_moving.end(), 1));
-    }
-    if (const Status status = files.add(placed(own, is_moving, T_world_keyframes[i])); !status) return status.error();
-    if (progress && !progress(i + 1)) {
-      fs::remove_all(tiles, failure);
-      return report;
-    }
+  Status written = ok();
+  bool is_stopped = false;
+  const Status status =
+      for_each_keyframe(input, options, report.moving, [&](const std::vector<Point>& placed, std::size_t done) {
+        written = files.add(placed);
+        is_stopped = progress && !progress(done);
+        return written && !is_stopped ? Next::kGoOn : Next::kStop;
+      });
+  if (!status) return status.error();
+  if (!written) return written.error();
+  if (is_stopped) {
+    fs::remove_all(tiles, failure);
+    return report;
   }
   if (const Status status = files.flush(); !status) return status.error();
   for (const TileIndex& index : files.tiles()) {

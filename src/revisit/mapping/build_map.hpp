@@ -32,13 +32,19 @@ struct MapReport {
   std::size_t points = 0, moving = 0;  ///< of the map; left out, before thinning
 };
 
+/// The key frames of a map in the order of the recording.
+struct MapInput {
+  std::vector<Pose> T_world_keyframes;
+  std::function<Result<std::vector<Point>>(std::size_t)> points;  ///< of key frame i in its own frame, or none
+};
+
+/// The map as points in the world's frame: one a voxel, without what moved. In memory at once.
+Result<std::vector<Point>> collect_map(const MapInput& input, const MapOptions& options);
+
 /// Puts key frames together into `folder`: map.ply, map.pcd, and tiles/ with a .ply a tile and tiles.json.
-/// `T_world_keyframes` in the order of the recording; `points(i)` gives the points of key frame i in its own frame, or
-/// none. In memory are some key frames and one tile at a time. `progress(done)` counts key frames and stops the work
+/// In memory are some key frames and one tile at a time. `progress(done)` counts key frames and stops the work
 /// by returning false: then nothing is written.
-Result<MapReport> build_map(const std::vector<Pose>& T_world_keyframes,
-                            const std::function<Result<std::vector<Point>>(std::size_t)>& points,
-                            const MapOptions& options, const std::filesystem::path& folder,
+Result<MapReport> build_map(const MapInput& input, const MapOptions& options, const std::filesystem::path& folder,
                             const std::function<bool(std::size_t)>& progress = {});
 
 }  // namespace revisit

@@ -5,6 +5,9 @@
 #include <fstream>
 #include <iterator>
 
+#include <algorithm>
+#include <tuple>
+
 #include <gtest/gtest.h>
 
 #include <revisit/mapping/internal/moving_points.hpp>
@@ -59,7 +62,7 @@ TEST(BuildMap, KeepsWhatStaysAndLeavesOutWhatMoves) {
     return points;
   };
   std::size_t done = 0;
-  const auto report = build_map(poses, seen, {}, folder, [&](std::size_t i) {
+  const auto report = build_map({poses, seen}, {}, folder, [&](std::size_t i) {
     done = i;
     return true;
   });
@@ -77,15 +80,15 @@ TEST(BuildMap, KeepsWhatStaysAndLeavesOutWhatMoves) {
   EXPECT_GT(parked, 60u);
   EXPECT_LT(passing, 400u) << "of 30 boxes of 100 voxels";
   EXPECT_GT(wall, 29'000u) << "of 1000 x 30";
-  const auto unfiltered = build_map(poses, seen, {.thin_moving = false}, folder);
+  const auto unfiltered = build_map({poses, seen}, {.thin_moving = false}, folder);
   ASSERT_TRUE(unfiltered);
   EXPECT_GT(unfiltered->points, report->points + 1500);
 }
 
 TEST(BuildMap, TilesHoldTheWholeMapOnce) {
   const fs::path folder = fresh_folder("tiles");
-  const auto report = build_map(
-      {planar_pose(100, 100, kPi / 2)}, [](std::size_t) { return wall_from(0.0); }, {}, folder);
+  const auto report =
+      build_map({{planar_pose(100, 100, kPi / 2)}, [](std::size_t) { return wall_from(0.0); }}, {}, folder);
   ASSERT_TRUE(report);
   ASSERT_GE(report->tiles.size(), 2u);
   std::size_t points = 0;
@@ -104,19 +107,32 @@ TEST(BuildMap, TilesHoldTheWholeMapOnce) {
 
 TEST(BuildMap, AnUnreadableKeyframeAndAFolderThatCannotBe) {
   const auto broken = build_map(
-      {Pose::Identity()}, [](std::size_t) -> Result<std::vector<Point>> { return Error{"key frame 0 is damaged"}; }, {},
-      fresh_folder("broken"));
+      {{Pose::Identity()}, [](std::size_t) -> Result<std::vector<Point>> { return Error{"key frame 0 is damaged"}; }},
+      {}, fresh_folder("broken"));
   ASSERT_FALSE(broken);
   EXPECT_EQ(broken.error().message, "key frame 0 is damaged");
-  EXPECT_FALSE(build_map(
-      {Pose::Identity()}, [](std::size_t) { return wall_from(0.0); }, {}, "/dev/null"));
+  EXPECT_FALSE(build_map({{Pose::Identity()}, [](std::size_t) { return wall_from(0.0); }}, {}, "/dev/null"));
 }
 
 TEST(BuildMap, NothingComesOfNothing) {
-  const auto report = build_map(
-      {}, [](std::size_t) { return wall_from(0.0); }, {}, fresh_folder("empty"));
+  const auto report = build_map({{}, [](std::size_t) { return wall_from(0.0); }}, {}, fresh_folder("empty"));
   ASSERT_TRUE(report);
   EXPECT_EQ(report->points, 0u);
+}
+
+TEST(CollectMap, HoldsThePointsOfTheFiles) {
+  const fs::path folder = fresh_folder("collected");
+  const MapInput input{{planar_pose(100, 100, kPi / 2), planar_pose(101, 100, kPi / 2)},
+                       [](std::size_t i) { return wall_from(static_cast<double>(i)); }};
+  ASSERT_TRUE(build_map(input, {}, folder));
+  auto points = collect_map(input, {});
+  ASSERT_TRUE(points);
+  std::vector<Point> filed = read_points(folder / "map.ply");
+  ASSERT_EQ(points->size(), filed.size());
+  const auto before = [](const Point& a, const Point& b) { return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z); };
+  std::sort(points->begin(), points->end(), before);
+  std::sort(filed.begin(), filed.end(), before);
+  for (std::size_t i = 0; i < filed.size(); ++i) ASSERT_FLOAT_EQ((*points)[i].x, filed[i].x) << i;
 }
 
 TEST(OnePointAVoxel, IsTheMean) {

@@ -31,7 +31,7 @@ std::size_t index_of(int azimuth, int elevation) {
 
 }  // namespace
 
-RangeImage::RangeImage(std::span<const Point> points) : ranges_m_(std::size_t{kAzimuths} * kElevations) {
+VisibilityImage::VisibilityImage(std::span<const Point> points) : ranges_m_(std::size_t{kAzimuths} * kElevations) {
   std::vector<float> nearest_m(ranges_m_.size());
   for (const Point& p : points) {
     const Cell cell = cell_of(p.x, p.y, p.z);
@@ -52,7 +52,7 @@ RangeImage::RangeImage(std::span<const Point> points) : ranges_m_(std::size_t{kA
     }
 }
 
-RangeImage::Verdict RangeImage::look(const Eigen::Vector3f& p) const {
+VisibilityImage::Verdict VisibilityImage::look(const Eigen::Vector3f& p) const {
   const Cell cell = cell_of(p.x(), p.y(), p.z());
   const float nearest_m = cell.is_inside() ? ranges_m_[index_of(cell.azimuth, cell.elevation)] : 0.f;
   if (nearest_m == 0.f) return Verdict::kUnknown;
@@ -63,17 +63,17 @@ RangeImage::Verdict RangeImage::look(const Eigen::Vector3f& p) const {
 }
 
 std::vector<std::uint8_t> find_moving(std::span<const Point> points, const Pose& T_world_lidar,
-                                      std::span<const Onlooker> onlookers) {
-  std::vector<Eigen::Isometry3f> T_onlooker_lidar;
-  for (const Onlooker& each : onlookers)
-    T_onlooker_lidar.emplace_back((each.T_world_lidar.inverse() * T_world_lidar).cast<float>());
+                                      std::span<const Observer> observers) {
+  std::vector<Eigen::Isometry3f> T_observer_lidar;
+  for (const Observer& each : observers)
+    T_observer_lidar.emplace_back((each.T_world_lidar.inverse() * T_world_lidar).cast<float>());
   std::vector<std::uint8_t> is_moving(points.size());
   const auto judge = [&](const Point& p) {
     int through = 0, surface = 0;
-    for (std::size_t i = 0; i < onlookers.size(); ++i) {
-      const auto verdict = onlookers[i].image->look(T_onlooker_lidar[i] * Eigen::Vector3f(p.x, p.y, p.z));
-      through += verdict == RangeImage::Verdict::kThrough;
-      surface += verdict == RangeImage::Verdict::kSurface;
+    for (std::size_t i = 0; i < observers.size(); ++i) {
+      const auto verdict = observers[i].image->look(T_observer_lidar[i] * Eigen::Vector3f(p.x, p.y, p.z));
+      through += verdict == VisibilityImage::Verdict::kThrough;
+      surface += verdict == VisibilityImage::Verdict::kSurface;
     }
     constexpr int kFewest = 2;
     return through >= kFewest && through > surface;

@@ -1,73 +1,69 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <optional>
-#include <span>
-#include <vector>
 
 #include <revisit/core/pose.hpp>
 #include <revisit/core/scan.hpp>
 #include <revisit/core/twist.hpp>
-#include <revisit/odometry/local_map.hpp>
+#include <revisit/odometry/scan_matcher.hpp>
 
 namespace revisit {
 
-/// A scan thinned for tracking, in its own frame.
-struct OdometryScan {
-  std::vector<Eigen::Vector3f> points;      ///< one a voxel of the map: what is found in it
-  std::vector<Eigen::Vector3f> map_points;  ///< some more: what enters it
-  double voxel_m = 1.0, range_m = 10.0;     ///< edge of a voxel; the median range
-};
-
-/// Where one scan was found to be.
+/// Where one scan is.
 struct OdometryStep {
-  Pose T_odom_lidar = Pose::Identity();    ///< at the scan's stamp; the first scan is the origin
-  Pose T_before_now = Pose::Identity();    ///< since the scan before
-  Pose T_before_found = Pose::Identity();  ///< since the scan before, as registration has it, believed or not
-  Matrix6 information = Matrix6::Zero();   ///< of T_before_now, as in LoopConstraint
-  double matched = 0.0;                    ///< share of the scan's points that lie on a surface of the map
-  double met = 0.0;                        ///< share with a surface of the map nearby at all
-  double surprise_m = 0.0;                 ///< how far what was found is from what was expected, at the median range
-  bool is_tracked = false;                 ///< otherwise the pose is the one that was expected
+  double stamp_s = 0.0;                      ///< of the scan; later than that of the scan before, whatever it said
+  Pose T_odom_lidar = Pose::Identity();      ///< the first scan is the origin
+  Pose T_previous_lidar = Pose::Identity();  ///< motion since the scan before
+  Matrix6 information = Matrix6::Zero();     ///< of that motion, as in LoopConstraint; zero where nothing measured it
+  std::optional<Twist> motion;               ///< during the sweep; absent where nothing is known of it
+  bool is_tracked = false;                   ///< otherwise the pose is the predicted one
+  bool is_connected = false;                 ///< tracked, and soon after the scan before: T_previous_lidar is sure
+  bool lost = false;                         ///< tracking ended with this scan: the next one begins a new segment
+  bool stamp_was_replaced = false;           ///< it was not after that of the scan before
+  int segment = 0;                           ///< of the trajectory; between two segments tracking was lost
+  Scan compensated;                          ///< the scan as it would have been seen at its stamp
 };
 
-/// Tracks a LiDAR against the map of what it saw lately. Nothing to tune: the map's voxels follow from how far the
-/// first scan sees, the search radius from how well the motion is foreseen. Scans come in the order of their stamps.
-/// Belongs to one thread at a time; deterministic, whatever the number of threads underneath.
+/// Follows the sensor from scan to scan: the one odometry of detection, SLAM and calibration. Compensates the motion
+/// within each sweep, matches the scan with the map of what was seen lately, uses wheels where there are any, and says
+/// when it is lost. Scans come filtered by range. Belongs to one thread at a time; deterministic.
 class Odometry {
  public:
-  /// The motion during the coming scan, if it follows closely on the last: to undo its distortion with.
-  std::optional<Twist> expected(double stamp_s) const;
+  enum class Source : std::uint8_t {
+    kLidar,    ///< scans are matched; a pose that comes with them is a first guess (wheels)
+    kExternal  ///< the poses that come with the scans are taken as they are
+  };
+  explicit Odometry(Source source = Source::kLidar) : source_(source) {}
 
-  /// Thins a scan (filtered by range, undistorted).
-  OdometryScan thinned(std::span<const Point> points) const;
-  /// Finds the scan in the map. `T_before_now`, if there is one, is what wheels or another odometry measured since the
-  /// scan before: the guess, and the answer where the map gives none.
-  OdometryStep find(double stamp_s, const OdometryScan& scan, const std::optional<Pose>& T_before_now = {}) const;
-  /// Goes on from there: the scan enters the map.
-  void accept(double stamp_s, const OdometryScan& scan, const OdometryStep& step);
-  /// All three.
-  OdometryStep track(double stamp_s, std::span<const Point> points, const std::optional<Pose>& T_before_now = {});
+  /// `T_external_lidar`: the pose from wheels or another odometry, in any frame of its own; it may slip and drift.
+  OdometryStep follow(Scan scan, const std::optional<Pose>& T_external_lidar = std::nullopt);
 
-  /// Forgets what was seen: the next scan begins a map of its own where it is expected to be. For a track that is lost.
-  void restart();
-  /// Goes on from here, with the motion since the scan before, if any. For a map that was put together from elsewhere.
-  void stand_at(double stamp_s, const Pose& T_odom_lidar, const std::optional<Twist>& motion);
-
-  const LocalMap* map() const { return map_ ? &*map_ : nullptr; }
+  /// A scan of an earlier run enters the map of what was seen lately: its points in its own frame, and its pose.
+  void restore_map(double stamp_s, std::span<const Point> points, const Pose& T_odom_lidar);
+  /// The last scan of an earlier run, and the motion since the one before, if it is known.
+  void restore(double stamp_s, const Pose& T_odom_lidar, const std::optional<Twist>& motion, int segment);
+  /// What the external odometry said at that last scan.
+  void restore_external(const Pose& T_external_lidar);
 
  private:
-  double search_radius_m() const;
-  bool is_believed(double matched, double met) const;
+  OdometryStep match(Scan scan, double stamp_s, const std::optional<Pose>& T_previous_lidar);
+  OdometryStep take(Scan scan, double stamp_s, const std::optional<Pose>& T_previous_lidar) const;
+  std::optional<Pose> motion_by_external(const std::optional<Pose>& T_external_lidar) const;
+  bool follows(double stamp_s) const;
+  void begin_map_again(const Twist& motion);
 
-  std::optional<LocalMap> map_;
-  Pose T_odom_lidar_ = Pose::Identity();
-  std::optional<Twist> motion_;
-  Eigen::Vector3f forgotten_from_ = Eigen::Vector3f::Zero();  ///< where the map was last cut to its reach
-  double last_stamp_s_ = 0.0, range_m_ = 0.0;
-  double squared_surprise_m2_ = 0.0;  ///< running mean of how far expectation was off
-  double usual_match_ = 0.0;          ///< running mean of the share that met the map
-  int scans_ = 0;                     ///< in the map
+  Source source_;
+  ScanMatcher matcher_;
+  bool has_last_ = false;
+  double last_stamp_s_ = 0.0;
+  Pose T_odom_last_ = Pose::Identity();
+  std::optional<Pose> T_external_last_;         ///< of the last scan that came with one
+  Pose T_odom_at_external_ = Pose::Identity();  ///< ours at that scan
+  std::optional<Scan> first_scan_;              ///< of a segment, as it was swept, until the motion is known
+  int untracked_ = 0;                           ///< scans in a row
+  int segment_ = 0;
 };
 
 }  // namespace revisit

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/odometry/odometry.hpp>
 
-#include <random>
-
 #include <gtest/gtest.h>
 
 #include "synthetic_world.hpp"
@@ -12,97 +10,106 @@ namespace {
 
 using testing_support::SyntheticWorld;
 
-// Along a bend, 0.6 m a scan.
-Pose on_the_way(int i) {
-  const double s = 0.6 * i, heading = 0.02 * i;
-  return SyntheticWorld::at(s, 0.2 * s * s / 20.0, heading);
-}
+constexpr double kPeriod_s = 0.1;
 
-std::vector<Point> seen_from(unsigned world, const Pose& T_world_lidar, unsigned noise) {
-  static const SyntheticWorld here(31), elsewhere(77);
-  return (world == 31 ? here : elsewhere).scan(T_world_lidar, {32, 600, -24.8, 5.0}, noise).points;
-}
+// Along a bend, 0.8 m a scan: the pose at any moment, in scans.
+Pose pose_at(double i) { return SyntheticWorld::at(0.8 * i, 0.01 * i * i, 0.02 * i); }
 
-TEST(Odometry, FollowsABend) {
-  Odometry odometry;
-  Pose T_found = Pose::Identity();
-  for (int i = 0; i < 30; ++i) {
-    const OdometryStep step = odometry.track(0.1 * i, seen_from(31, on_the_way(i), static_cast<unsigned>(i)));
-    EXPECT_TRUE(step.is_tracked) << "scan " << i << ", matched " << step.matched;
-    T_found = step.T_odom_lidar;
+// A scan whose points were seen one after the other while the sensor moved: the stamp is at its end.
+Scan swept_scan(int i, bool is_swept = true) {
+  static const SyntheticWorld world(31);
+  Scan scan = world.scan(pose_at(i), {32, 600, -24.8, 5.0}, static_cast<unsigned>(i));
+  scan.frame = FrameId{i};
+  scan.stamp_s = kPeriod_s * i;
+  if (!is_swept) return scan;
+  for (Point& p : scan.points) {
+    const double share = std::atan2(p.y, p.x) / (2.0 * kPi) - 0.5;  // -1 to 0, in scans
+    const Eigen::Vector3f seen =
+        ((pose_at(i + share).inverse() * pose_at(i)).cast<float>()) * Eigen::Vector3f(p.x, p.y, p.z);
+    p = {seen.x(), seen.y(), seen.z(), p.intensity};
+    scan.times_s.push_back(static_cast<float>(share * kPeriod_s));
   }
-  const Pose error = (on_the_way(0).inverse() * on_the_way(29)).inverse() * T_found;
-  EXPECT_LT(error.translation().norm(), 0.01 * 0.6 * 29) << "1 % of the way";
-  EXPECT_LT(to_degrees(rotation_angle(error)), 0.5);
+  return scan;
 }
 
-// Turns and translations about an origin far away are nearly the same: they must not be solved for there.
-TEST(Odometry, FollowsAsWellFarFromTheOrigin) {
+double error_m(const OdometryStep& step, int i) {
+  return ((pose_at(0).inverse() * pose_at(i)).translation() - step.T_odom_lidar.translation()).norm();
+}
+
+TEST(Odometry, CompensatesTheSweepItFollows) {
   Odometry odometry;
-  Pose T_far = planar_pose(4000.0, -3000.0, 2.0);
-  odometry.stand_at(-0.1, T_far, std::nullopt);
-  Pose T_found = T_far;
+  OdometryStep step;
   for (int i = 0; i < 15; ++i) {
-    const Pose T_wheels = i == 0 ? Pose(Pose::Identity())
-                                 : on_the_way(i - 1).inverse() * on_the_way(i) * planar_pose(0.1, 0.0, to_radians(2.0));
-    T_found = odometry.track(0.1 * i, seen_from(31, on_the_way(i), static_cast<unsigned>(i)), T_wheels).T_odom_lidar;
+    step = odometry.follow(swept_scan(i));
+    EXPECT_TRUE(step.is_tracked) << i;
+    EXPECT_EQ(step.is_connected, i > 0);
+    EXPECT_EQ(step.segment, 0);
   }
-  const Pose error = (on_the_way(0).inverse() * on_the_way(14)).inverse() * (T_far.inverse() * T_found);
-  EXPECT_LT(error.translation().norm(), 0.01 * 0.6 * 14);
-  EXPECT_LT(to_degrees(rotation_angle(error)), 0.5);
+  EXPECT_LT(error_m(step, 14), 0.05) << "over 11 m";
+  ASSERT_TRUE(step.motion);
+  EXPECT_NEAR(step.motion->linear_mps.norm(), 0.8 / kPeriod_s, 0.5);
+  // The same scan, taken at once, is what compensation must give.
+  const Scan still = swept_scan(14, false);
+  double worst_m = 0.0;
+  for (std::size_t k = 0; k < still.points.size(); k += 50)
+    worst_m = std::max(worst_m, static_cast<double>(std::hypot(still.points[k].x - step.compensated.points[k].x,
+                                                               still.points[k].y - step.compensated.points[k].y)));
+  EXPECT_LT(worst_m, 0.1);
 }
 
-TEST(Odometry, SaysWhenItIsLostAndKeepsWhatWheelsSay) {
+TEST(Odometry, AfterFiveScansElsewhereItIsLostAndBeginsASegment) {
   Odometry odometry;
-  for (int i = 0; i < 12; ++i) odometry.track(0.1 * i, seen_from(31, on_the_way(i), static_cast<unsigned>(i)));
-  // Somewhere else all at once, and then nothing to be seen at all.
-  const Pose T_wheels = planar_pose(0.6, 0.0, 0.02);
-  const double usual = odometry.find(1.2, odometry.thinned(seen_from(31, on_the_way(12), 12))).matched;
-  const OdometryStep lost = odometry.track(1.2, seen_from(77, SyntheticWorld::at(40, 30, 2.0), 1), T_wheels);
-  const OdometryStep blind = odometry.track(1.3, {}, T_wheels);
-  for (const OdometryStep& step : {lost, blind}) {
-    EXPECT_FALSE(step.is_tracked) << step.matched << " of " << usual;
-    EXPECT_TRUE(step.T_before_now.isApprox(T_wheels));
+  for (int i = 0; i < 12; ++i) odometry.follow(swept_scan(i));
+  static const SyntheticWorld elsewhere(77);
+  int lost_at = -1;
+  for (int i = 12; i < 20; ++i) {
+    Scan scan = elsewhere.scan(SyntheticWorld::at(40 + 9.0 * (i % 2), 30, 2.0 + i, 8.0), {32, 600, -24.8, 5.0});
+    scan.stamp_s = kPeriod_s * i;
+    const OdometryStep step = odometry.follow(std::move(scan));
+    if (step.lost && lost_at < 0) lost_at = i;
+    EXPECT_EQ(step.segment, lost_at >= 0 && i > lost_at ? 1 : 0) << i;
+    if (i == 12) EXPECT_FALSE(step.is_connected);
   }
+  EXPECT_EQ(lost_at, 16);
 }
 
-// A bare corridor without an end: every scan looks like the one before, wherever the robot is.
-std::vector<Point> corridor(unsigned noise) {
-  std::mt19937 random(noise);
-  std::normal_distribution<float> off(0.f, 0.01f);
-  std::vector<Point> points;
-  for (float x = -30.f; x < 30.f; x += 0.1f) {
-    for (float z = -1.f; z < 2.f; z += 0.2f)
-      for (const float y : {-2.f, 2.f}) points.push_back({x, y + off(random), z, 0.f});
-    for (float y = -2.f; y < 2.f; y += 0.2f) points.push_back({x, y, -1.f + off(random), 0.f});
-  }
-  return points;
-}
-
-TEST(Odometry, WhereScansSayNothingWheelsDo) {
+TEST(Odometry, StampsThatStandStillAreReplacedAndSaid) {
   Odometry odometry;
-  const Pose T_wheels = planar_pose(0.5, 0.0, 0.0);
-  Pose T_found = Pose::Identity();
-  for (int i = 0; i < 40; ++i) {
-    const OdometryStep step = odometry.track(0.1 * i, corridor(static_cast<unsigned>(i)),
-                                             i == 0 ? std::nullopt : std::optional<Pose>(T_wheels));
-    EXPECT_TRUE(step.is_tracked);
-    T_found = step.T_odom_lidar;
-  }
-  EXPECT_NEAR(T_found.translation().x(), 19.5, 0.4) << "2 % of the way";
-  EXPECT_LT(std::abs(T_found.translation().y()), 0.1);
+  odometry.follow(swept_scan(0, false));
+  Scan scan = swept_scan(1, false);
+  scan.stamp_s = 0.0;
+  const OdometryStep step = odometry.follow(std::move(scan));
+  EXPECT_TRUE(step.stamp_was_replaced);
+  EXPECT_NEAR(step.stamp_s, 0.1, 1e-12);
 }
 
-TEST(Odometry, AStandingStartAndTimesThatStandStill) {
-  Odometry odometry;
-  for (const double stamp_s : {5.0, 5.0, 4.0, 4.5}) {
-    const OdometryStep step = odometry.track(stamp_s, seen_from(31, on_the_way(0), 3));
-    EXPECT_TRUE(step.is_tracked);
-    EXPECT_LT(step.T_odom_lidar.translation().norm(), 0.01);
+// Poses made from poses, scan after scan, with inverses in between: rounding must not grow.
+TEST(Odometry, ALongExternalOdometryStaysARotation) {
+  Odometry odometry(Odometry::Source::kExternal);
+  OdometryStep step;
+  constexpr int kScans = 3000;
+  for (int i = 0; i < kScans; ++i) {
+    Scan scan;
+    scan.stamp_s = kPeriod_s * i;
+    step = odometry.follow(std::move(scan), planar_pose(7, 8, 2.5) * planar_pose(0.1 * i, 0.0, 0.013 * i));
   }
-  EXPECT_FALSE(odometry.expected(4.5)) << "no time has passed";
-  EXPECT_FALSE(odometry.expected(60.0)) << "too long a gap to foresee anything";
-  EXPECT_TRUE(odometry.expected(4.6));
+  EXPECT_TRUE(step.T_odom_lidar.linear().isUnitary(1e-12));
+  EXPECT_NEAR(step.T_odom_lidar.translation().x(), 0.1 * (kScans - 1), 1e-6);
+  EXPECT_TRUE(step.is_connected);
+}
+
+TEST(Odometry, WithoutAPoseTheExternalOdometryIsNotConnected) {
+  Odometry odometry(Odometry::Source::kExternal);
+  const auto scan_at = [](double stamp_s) {
+    Scan scan;
+    scan.stamp_s = stamp_s;
+    return scan;
+  };
+  EXPECT_TRUE(odometry.follow(scan_at(0.0), planar_pose(0, 0, 0)).is_tracked);
+  EXPECT_FALSE(odometry.follow(scan_at(0.1)).is_tracked);
+  const OdometryStep step = odometry.follow(scan_at(0.2), planar_pose(1, 0, 0));
+  EXPECT_TRUE(step.is_tracked);
+  EXPECT_NEAR(step.T_odom_lidar.translation().x(), 1.0, 1e-12) << "from the last scan that had a pose";
 }
 
 }  // namespace

@@ -13,7 +13,7 @@
 namespace revisit {
 
 /// Learns phi(eta, d) from a recording alone, its intensities brought to [0, 1] first. Poses come from the recording
-/// where it has them; otherwise neighbouring scans are registered, and runs that cannot be are left out.
+/// where it has them; otherwise odometry gives them, and scans that it loses are left out.
 /// `progress(done, total)` is called after each scan and stops the work by returning false.
 Result<CalibrationReport> calibrate_recording(const Recording& recording, const Parameters& parameters,
                                               std::size_t most_scans, const LogSink& log,

@@ -1,87 +1,44 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/pipeline/prepare.hpp>
 
-#include <algorithm>
-#include <chrono>
+#include <utility>
+#include <vector>
 
 #include <oneapi/tbb/parallel_invoke.h>
 
+#include <revisit/core/stopwatch.hpp>
 #include <revisit/preprocess/range_filter.hpp>
 #include <revisit/preprocess/rings.hpp>
 #include <revisit/preprocess/undistort.hpp>
 #include <revisit/preprocess/upright.hpp>
+#include <revisit/verification/geometric.hpp>
 
 namespace revisit {
 namespace {
 
-double now_ms() {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-std::vector<Point> above_ground(const Scan& scan, const std::vector<std::uint8_t>& is_ground) {
-  std::vector<Point> points;
-  points.reserve(scan.points.size());
-  for (std::size_t i = 0; i < scan.points.size(); ++i)
-    if (is_ground[i] == 0) points.push_back(scan.points[i]);
-  return points;
-}
-
-}  // namespace
-
-Stopwatch::Stopwatch() : last_ms_(now_ms()) {}
-
-double Stopwatch::lap_ms() {
-  const double now = now_ms(), lap = now - last_ms_;
-  last_ms_ = now;
-  return lap;
-}
-
-namespace {
-
-// About the sensor; those of an upright one are not touched.
-void turn(std::span<Point> points, const Pose& T) {
-  const Eigen::Matrix3f R = T.linear().cast<float>();
-  if (R.isIdentity(0.f)) return;
-  for (Point& p : points) {
-    const Eigen::Vector3f q = R * Eigen::Vector3f(p.x, p.y, p.z);
-    p = {q.x(), q.y(), q.z(), p.intensity};
-  }
-}
-
-Twist turned(const Twist& motion, const Pose& T) {
-  return {T.linear() * motion.linear_mps, T.linear() * motion.angular_radps};
-}
-
-// The middle of the heights of the ground nearby; where there is none, that of a sensor on a car.
-double ground_below_sensor_m(std::span<const Point> points, std::span<const std::uint8_t> is_ground) {
-  constexpr float kNearby_m = 15.f;
-  constexpr std::size_t kFewest = 50;
-  std::vector<float> heights;
-  for (std::size_t i = 0; i < points.size(); ++i)
-    if (is_ground[i] != 0 && points[i].x * points[i].x + points[i].y * points[i].y < kNearby_m * kNearby_m)
-      heights.push_back(points[i].z);
-  if (heights.size() < kFewest) return kGroundBelowCarSensor_m;
-  const auto middle = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2);
-  std::nth_element(heights.begin(), middle, heights.end());
-  return static_cast<double>(*middle);
+Error describes_no_place(const PreparedScan& prepared) {
+  return {"frame " + std::to_string(prepared.scan.frame.value) + ": " + std::to_string(prepared.scan.points.size()) +
+          " usable points occupy " + std::to_string(prepared.descriptor.occupied_cells()) + " of " +
+          std::to_string(prepared.descriptor.image_cells()) + " cells; at least " +
+          std::to_string(LayerConstants::kFewestCells) + " are needed to describe a place"};
 }
 
 }  // namespace
 
 Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const IntensityScale& scale,
                                   const IntensityCalibration& calibration, const std::optional<Twist>& motion) {
-  require_consistent(scan);
   PreparedScan prepared;
   prepared.scan = std::move(scan);
+  std::vector<Point>& points = prepared.scan.points;
   Stopwatch watch;
   filter_range(prepared.scan, parameters.preprocess);
   prepared.ms.filter = watch.lap_ms();
 
   Rings rings;
   Eigen::Vector3f up;
-  tbb::parallel_invoke([&] { rings = find_rings(prepared.scan); }, [&] { up = find_up(prepared.scan.points); });
+  tbb::parallel_invoke([&] { rings = find_rings(prepared.scan); }, [&] { up = find_up(points); });
   const Pose T_upright_lidar = upright_pose(up);
-  turn(prepared.scan.points, T_upright_lidar);
+  rotate(points, T_upright_lidar);
   prepared.ground = segment_ground(prepared.scan, rings, parameters.preprocess);
   prepared.ms.ground = watch.lap_ms();
 
@@ -89,49 +46,61 @@ Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const
   const bool rings_fit = rings.count() == calibration.ring_gains.size();
   normalise_intensity(prepared.scan, scale, calibration,
                       rings_fit ? std::span<const std::uint16_t>(rings.of_point) : std::span<const std::uint16_t>());
-  if (motion) undistort(prepared.scan, turned(*motion, T_upright_lidar));
+  if (motion) undistort(prepared.scan, rotated(*motion, T_upright_lidar));
   prepared.ms.intensity = watch.lap_ms();
 
-  prepared.ground_z_m = ground_below_sensor_m(prepared.scan.points, prepared.ground.is_ground);
-  std::vector<Point> standing;
-  std::span<const Point> described = prepared.scan.points;
-  if (parameters.preprocess.remove_ground)
-    described = standing = above_ground(prepared.scan, prepared.ground.is_ground);
-  prepared.descriptor = describe(described, parameters.descriptor, prepared.ground_z_m);
+  prepared.ground_z_m = ground_height_m(points, prepared.ground.is_ground);
+  prepared.descriptor =
+      parameters.preprocess.remove_ground
+          ? describe(above_ground(points, prepared.ground.is_ground), parameters.descriptor, prepared.ground_z_m)
+          : describe(points, parameters.descriptor, prepared.ground_z_m);
   prepared.ms.describe = watch.lap_ms();
-  if (prepared.descriptor.occupied_cells() < parameters.descriptor.min_occupied_cells)
-    return Error{"frame " + std::to_string(prepared.scan.frame.value) + ": " +
-                 std::to_string(prepared.scan.points.size()) + " usable points occupy " +
-                 std::to_string(prepared.descriptor.occupied_cells()) + " of " +
-                 std::to_string(prepared.descriptor.image_cells()) + " cells; at least " +
-                 std::to_string(parameters.descriptor.min_occupied_cells) + " are needed to describe a place"};
+  if (prepared.descriptor.occupied_cells() < LayerConstants::kFewestCells) return describes_no_place(prepared);
 
-  turn(prepared.scan.points, T_upright_lidar.inverse());
-  prepared.cloud = thin(prepared.scan.points, prepared.ground.is_ground, parameters.geometric.voxel_m);
+  rotate(points, T_upright_lidar.inverse());
+  prepared.cloud = thin(points, prepared.ground.is_ground, LearntWith::kVoxel_m);
   prepared.cloud.up = up;
   prepared.ms.thin = watch.lap_ms();
   return prepared;
 }
 
-Result<IntensityScale> estimate_intensity_scale(const Recording& recording, const Parameters& parameters) {
-  constexpr std::size_t kSamples = 10;
-  std::vector<Scan> sample;
-  std::optional<Error> first_error;
-  const std::size_t count = std::min(kSamples, recording.size());
-  // The first readable scan of each tenth of the recording: broken ones must not decide.
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t begin = i * recording.size() / count, end = (i + 1) * recording.size() / count;
-    for (std::size_t index = begin; index < end; ++index) {
-      auto scan = recording.read(index);
-      if (scan) {
-        sample.push_back(*std::move(scan));
-        break;
-      }
-      if (!first_error) first_error = scan.error();
-    }
+ScanPreparation::ScanPreparation(const Parameters& parameters, const std::optional<IntensityScale>& scale,
+                                 IntensityCalibration calibration, LogSink log)
+    : parameters_(parameters),
+      scale_(parameters.intensity),
+      calibration_(std::move(calibration)),
+      log_(std::move(log)) {
+  if (scale) {
+    scale_.set(*scale);
+    reported_warning_ = scale->warning;  // who gave the scale knows
   }
-  if (sample.empty()) return first_error.value_or(Error{"the recording holds no scan"});
-  return estimate_intensity_scale(std::span<const Scan>(sample), parameters.intensity);
+}
+
+Result<PreparedScan> ScanPreparation::prepare(Scan scan, const std::optional<Twist>& motion) {
+  require_consistent(scan);
+  if (!scale_.is_settled()) {
+    filter_range(scan, parameters_.preprocess);
+    scale_.add(scan);
+    if (const std::string& warning = scale_.scale().warning; !warning.empty() && warning != reported_warning_)
+      log_to(log_, LogLevel::kWarning, warning);
+    reported_warning_ = scale_.scale().warning;
+  }
+  auto prepared = prepare_scan(std::move(scan), parameters_, scale_.scale(), calibration_, motion);
+  if (prepared && !std::exchange(has_reported_rings_, true)) report(prepared->ground);
+  return prepared;
+}
+
+void ScanPreparation::report(const GroundSegmentation& ground) {
+  const std::size_t known = calibration_.ring_gains.size(), seen = ground.ring_count;
+  if (known != 0 && known != seen)
+    log_to(log_, LogLevel::kWarning,
+           "the intensity calibration knows " + std::to_string(known) + " laser rings, the scans show " +
+               std::to_string(seen) + ": its ring gains are left out (was it made with another sensor?)");
+  if (ground.rings == RingSource::kNone)
+    log_to(log_, LogLevel::kWarning,
+           "no laser rings found: ground is segmented on a polar grid instead of the range image");
+  else
+    log_to(log_, LogLevel::kInfo, std::to_string(seen) + " laser rings, " + to_string(ground.rings));
 }
 
 }  // namespace revisit

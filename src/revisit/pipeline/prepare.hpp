@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <optional>
 
@@ -10,52 +9,59 @@
 #include <revisit/core/log.hpp>
 #include <revisit/core/result.hpp>
 #include <revisit/core/scan.hpp>
+#include <revisit/core/trajectory_point.hpp>
 #include <revisit/core/twist.hpp>
 #include <revisit/descriptors/intensity_scan_context.hpp>
-#include <revisit/io/recording.hpp>
-#include <revisit/pipeline/loop_track.hpp>
 #include <revisit/preprocess/ground.hpp>
 #include <revisit/preprocess/intensity.hpp>
-#include <revisit/registration/feature_alignment.hpp>
+#include <revisit/registration/scan_geometry.hpp>
 
 namespace revisit {
 
-/// A scan made ready: filtered by range, ground found, intensity in [0, 1]; then described and thinned.
+/// A scan made ready: filtered by range, ground found, intensity in [0, 1], sweep compensated; then described and
+/// thinned.
 struct PreparedScan {
   Scan scan;
   GroundSegmentation ground;
   IntensityScanContext descriptor;
-  double ground_z_m = 0.0;                       ///< where the ground lies below the sensor, were it upright
+  double ground_z_m = 0.0;                       ///< height of the ground in the frame of the sensor, were it upright
   ThinCloud cloud;                               ///< for registration; the ground is kept and marked
-  std::shared_ptr<const ScanGeometry> geometry;  ///< of the cloud, where somebody has asked for it already
-  std::optional<Station> station;                ///< where it was taken along the sensor's way, where that is known
-  /// How much of the last few scans fitted the one before each, where that is known.
-  std::optional<double> usual_inlier_ratio;
+  std::shared_ptr<const ScanGeometry> geometry;  ///< of the cloud, where it was needed already
+  std::optional<TrajectoryPoint> trajectory_point;  ///< by odometry, where it is known
 
   struct Milliseconds {
     double filter = 0.0, ground = 0.0, intensity = 0.0, describe = 0.0, thin = 0.0;
   } ms;
 };
 
-/// The paper's sections III-A and III-B in order; with the sensor's `motion`, the distortion of the sweep is undone
-/// after the ground is found. A scan of a tilted sensor is set upright while its ground is found and it is described
-/// (ThinCloud::up); its points stay as they are. An error says why the scan describes no place.
+/// The paper's sections III-A and III-B in order. With the sensor's `motion`, the sweep is compensated after the ground
+/// was found. A scan of a tilted sensor is set upright while its ground is found and it is described (ThinCloud::up);
+/// its points stay in the sensor's frame. An error says why the scan describes no place.
 Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const IntensityScale& scale,
                                   const IntensityCalibration& calibration = {},
                                   const std::optional<Twist>& motion = std::nullopt);
 
-/// The intensity scale of a recording, from up to ten readable scans spread over it.
-/// An error where none of them is readable: the first one's.
-Result<IntensityScale> estimate_intensity_scale(const Recording& recording, const Parameters& parameters);
-
-/// Milliseconds since the previous call (or construction), of a clock that never jumps.
-class Stopwatch {
+/// prepare_scan() for one scan after the other of one sensor: learns the intensity scale from the first ones, and says
+/// once what it found out about the sensor. Belongs to one thread at a time.
+class ScanPreparation {
  public:
-  Stopwatch();
-  double lap_ms();
+  ScanPreparation(const Parameters& parameters, const std::optional<IntensityScale>& scale,
+                  IntensityCalibration calibration, LogSink log);
+
+  Result<PreparedScan> prepare(Scan scan, const std::optional<Twist>& motion = std::nullopt);
+
+  const IntensityScale& intensity_scale() const { return scale_.scale(); }
+  void set_intensity_scale(const IntensityScale& scale) { scale_.set(scale); }
 
  private:
-  double last_ms_;
+  void report(const GroundSegmentation& ground);
+
+  Parameters parameters_;
+  IntensityScaleLearner scale_;
+  IntensityCalibration calibration_;
+  LogSink log_;
+  bool has_reported_rings_ = false;
+  std::string reported_warning_;
 };
 
 }  // namespace revisit

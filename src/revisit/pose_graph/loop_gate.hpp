@@ -4,46 +4,48 @@
 #include <cstddef>
 #include <vector>
 
-#include <revisit/core/pose.hpp>
-#include <revisit/core/results.hpp>
+#include <revisit/core/loop.hpp>
+#include <revisit/core/trajectory_point.hpp>
 
 namespace revisit {
 
 /// Pairwise consistency (Mangelson et al., ICRA 2018): two loops close a circle with the odometry between their ends.
-/// A loop enters the graph once another one near it says the same; one that stays alone must be very sure of itself.
+/// A loop enters the graph once another one near it agrees; one that stays alone must be very sure.
 /// Belongs to one thread at a time.
 class LoopGate {
  public:
-  /// A key frame as odometry alone places it. Frames increase. `starts_anew`: tracking was lost before it.
-  void add_keyframe(FrameId frame, const Pose& T_odom_lidar, bool starts_anew);
+  /// A key frame as odometry alone places it. Frames increase; otherwise std::invalid_argument.
+  void add_keyframe(FrameId frame, const TrajectoryPoint& point);
 
   struct Decision {
-    LoopRow loop;
+    LoopConstraint loop;
     bool enters = false;
-    std::size_t agreeing = 0;  ///< other loops nearby that say the same
+    std::size_t agreeing = 0;  ///< other loops nearby that agree
   };
   /// Decides about this loop, or about some that waited, or keeps it waiting. Its ends are key frames.
-  std::vector<Decision> offer(const LoopRow& loop);
+  std::vector<Decision> offer(const LoopConstraint& loop);
   /// A loop that entered in an earlier run.
-  void restore(const LoopRow& loop) { entered_.push_back(loop); }
-  /// Decides about those whom nobody can confirm any more, as the newest key frame lies too far from them; at the end,
-  /// about all.
-  std::vector<Decision> decide_waiting(bool is_end);
+  void restore(const LoopConstraint& loop) { entered_.push_back(loop); }
+  /// Decides about the loops that nothing can confirm any more, because the newest key frame is too far from them.
+  std::vector<Decision> decide_overdue();
+  /// Decides about all that wait: no more will come.
+  std::vector<Decision> decide_all();
 
  private:
   struct Keyframe {
     FrameId frame;
-    Pose T_odom_lidar = Pose::Identity();
-    double way_m = 0.0;  ///< along the trajectory, until here
-    int segment = 0;     ///< between two losses of track
+    TrajectoryPoint point;
   };
   enum class Verdict { kNothing, kAgree, kContradict };
-  const Keyframe& at(FrameId frame) const;
-  Verdict compare(const LoopRow& a, const LoopRow& b) const;
-  Decision judge_alone(const LoopRow& loop) const;
+  const TrajectoryPoint& at(FrameId frame) const;
+  Verdict compare(const LoopConstraint& a, const LoopConstraint& b) const;
+  bool is_overdue(const LoopConstraint& loop) const;
+  Decision decide_alone(const LoopConstraint& loop) const;
+  template <typename IsDue>
+  std::vector<Decision> decide(IsDue is_due);
 
   std::vector<Keyframe> keyframes_;
-  std::vector<LoopRow> entered_, waiting_;
+  std::vector<LoopConstraint> entered_, waiting_;
 };
 
 }  // namespace revisit

@@ -11,13 +11,18 @@ namespace {
 // Out along x, a key frame a metre, and the same way again from frame 1000 on, as odometry sees it: 2 % too long.
 LoopGate gate_of_two_visits() {
   LoopGate gate;
-  for (int i = 0; i < 100; ++i) gate.add_keyframe({i}, planar_pose(i, 0, 0), false);
-  for (int i = 0; i < 100; ++i) gate.add_keyframe({1000 + i}, planar_pose(1.01 * i, 5, 0), false);
+  TrajectoryPoint point;
+  const auto add = [&](int frame, const Pose& T_odom_lidar) {
+    if (frame > 0) point = point.after(point.T_segment_lidar.inverse() * T_odom_lidar);
+    gate.add_keyframe({frame}, point);
+  };
+  for (int i = 0; i < 100; ++i) add(i, planar_pose(i, 0, 0));
+  for (int i = 0; i < 100; ++i) add(1000 + i, planar_pose(1.01 * i, 5, 0));
   return gate;
 }
 
-LoopRow loop(int query, int match, double x_m, double probability = 0.97) {
-  return {{{query}, {match}, planar_pose(x_m, 0, 0), 0.8, 0.1, probability, Matrix6::Identity()}, 1.0};
+LoopConstraint loop(int query, int match, double x_m, double probability = 0.97) {
+  return {{query}, {match}, planar_pose(x_m, 0, 0), 0.8, 0.1, probability, 1.0, Matrix6::Identity()};
 }
 
 TEST(LoopGate, ALoopWaitsUntilAnotherAgrees) {
@@ -25,26 +30,26 @@ TEST(LoopGate, ALoopWaitsUntilAnotherAgrees) {
   EXPECT_TRUE(gate.offer(loop(1010, 10, 0.2)).empty());
   const auto decisions = gate.offer(loop(1012, 12, 0.1));
   ASSERT_EQ(decisions.size(), 2u);
-  EXPECT_EQ(decisions[0].loop.constraint.query, FrameId{1010});
+  EXPECT_EQ(decisions[0].loop.query, FrameId{1010});
   EXPECT_TRUE(decisions[0].enters && decisions[1].enters);
-  EXPECT_TRUE(gate.decide_waiting(true).empty());
+  EXPECT_TRUE(gate.decide_all().empty());
 }
 
 TEST(LoopGate, LoopsThatContradictDoNotLetEachOtherIn) {
   LoopGate gate = gate_of_two_visits();
   EXPECT_TRUE(gate.offer(loop(1010, 10, 0.2)).empty());
   EXPECT_TRUE(gate.offer(loop(1012, 30, 0.1)).empty()) << "18 m off";
-  for (const auto& decision : gate.decide_waiting(true)) EXPECT_FALSE(decision.enters);
+  for (const auto& decision : gate.decide_all()) EXPECT_FALSE(decision.enters);
 }
 
 TEST(LoopGate, AloneOnlyTheSureEnter) {
   LoopGate gate = gate_of_two_visits();
   EXPECT_TRUE(gate.offer(loop(1010, 10, 0.2, 0.9995)).empty());
   EXPECT_TRUE(gate.offer(loop(1090, 90, 0.2, 0.98)).empty()) << "too far for odometry to compare them";
-  const auto passed = gate.decide_waiting(false);
+  const auto passed = gate.decide_overdue();
   ASSERT_EQ(passed.size(), 1u) << "the newest key frame is only 9 m beyond the second one";
   EXPECT_TRUE(passed[0].enters);
-  const auto rest = gate.decide_waiting(true);
+  const auto rest = gate.decide_all();
   ASSERT_EQ(rest.size(), 1u);
   EXPECT_FALSE(rest[0].enters);
 }
@@ -54,15 +59,16 @@ TEST(LoopGate, SureOfItselfButAgainstTheOthers) {
   EXPECT_TRUE(gate.offer(loop(1010, 10, 0.2)).empty());
   EXPECT_EQ(gate.offer(loop(1012, 12, 0.1)).size(), 2u);
   EXPECT_TRUE(gate.offer(loop(1014, 30, 0.1, 0.9999)).empty());
-  const auto rest = gate.decide_waiting(true);
+  const auto rest = gate.decide_all();
   ASSERT_EQ(rest.size(), 1u);
   EXPECT_FALSE(rest[0].enters);
 }
 
 TEST(LoopGate, NothingIsComparedAcrossALossOfTrack) {
   LoopGate gate;
-  for (int i = 0; i < 20; ++i) gate.add_keyframe({i}, planar_pose(i, 0, 0), false);
-  for (int i = 0; i < 20; ++i) gate.add_keyframe({1000 + i}, planar_pose(i, 5, 0), i == 11);
+  for (int i = 0; i < 20; ++i) gate.add_keyframe({i}, {0, planar_pose(i, 0, 0), 1.0 * i});
+  for (int i = 0; i < 20; ++i)
+    gate.add_keyframe({1000 + i}, {i < 11 ? 0 : 1, planar_pose(i, 5, 0), i < 11 ? 20.0 + i : i - 11.0});
   EXPECT_TRUE(gate.offer(loop(1010, 10, 0.2)).empty());
   EXPECT_TRUE(gate.offer(loop(1012, 12, 0.1)).empty());
   EXPECT_EQ(gate.offer(loop(1014, 14, 0.1)).size(), 2u);
@@ -72,7 +78,7 @@ TEST(LoopGate, KnowsItsKeyframes) {
   LoopGate gate = gate_of_two_visits();
   EXPECT_TRUE(gate.offer(loop(1010, 10, 0.2)).empty());
   EXPECT_THROW(gate.offer(loop(5000, 10, 0.2)), std::invalid_argument);
-  EXPECT_THROW(gate.add_keyframe({3}, Pose::Identity(), false), std::invalid_argument);
+  EXPECT_THROW(gate.add_keyframe({3}, TrajectoryPoint{}), std::invalid_argument);
 }
 
 }  // namespace

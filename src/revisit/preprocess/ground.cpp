@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/preprocess/ground.hpp>
 
+#include <algorithm>
 #include <cmath>
 
 #include <oneapi/tbb/blocked_range.h>
@@ -84,12 +85,11 @@ void remove_small_segments(const RangeImage& image, int fewest, std::vector<std:
 // Points that share a pixel with a ground point are ground if they are no higher than its roughness.
 std::vector<std::uint8_t> label_points(const Scan& scan, const RangeImage& image,
                                        const std::vector<std::uint8_t>& labels) {
-  constexpr float kThickness_m = 0.15f;
   std::vector<std::uint8_t> is_ground(scan.points.size(), 0);
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const auto pixel = static_cast<std::size_t>(image.pixel_of[i]);
     if (labels[pixel] == 0) continue;
-    is_ground[i] = scan.points[i].z - image.pixels[pixel].z < kThickness_m;
+    is_ground[i] = scan.points[i].z - image.pixels[pixel].z < GroundConstants::kThickness_m;
   }
   return is_ground;
 }
@@ -105,10 +105,30 @@ GroundSegmentation segment_ground(const Scan& scan, const Rings& rings, const Pr
     return result;
   }
   const RangeImage image = preprocess_internal::make_range_image(scan, rings);
-  std::vector<std::uint8_t> labels = label_pixels(image, options.ground_slope_deg);
-  remove_small_segments(image, options.ground_min_segment_points, labels);
+  std::vector<std::uint8_t> labels = label_pixels(image, GroundConstants::kSlope_deg);
+  remove_small_segments(image, GroundConstants::kFewestPixels, labels);
   result.is_ground = label_points(scan, image, labels);
   return result;
+}
+
+double ground_height_m(std::span<const Point> points, std::span<const std::uint8_t> is_ground) {
+  constexpr float kNearby2 = GroundConstants::kNearby_m * GroundConstants::kNearby_m;
+  std::vector<float> heights;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (is_ground[i] != 0 && points[i].x * points[i].x + points[i].y * points[i].y < kNearby2)
+      heights.push_back(points[i].z);
+  if (heights.size() < GroundConstants::kFewestNearby) return kGroundBelowCarSensor_m;
+  const auto middle = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2);
+  std::nth_element(heights.begin(), middle, heights.end());
+  return static_cast<double>(*middle);
+}
+
+std::vector<Point> above_ground(std::span<const Point> points, std::span<const std::uint8_t> is_ground) {
+  std::vector<Point> above;
+  above.reserve(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (is_ground[i] == 0) above.push_back(points[i]);
+  return above;
 }
 
 }  // namespace revisit

@@ -13,6 +13,7 @@ namespace {
 constexpr double kShareOfDistinctReadings = 0.5, kShareOfSweepFractions = 0.98;
 constexpr float kLongestSweep_s = 0.25f, kHighestRing = 256.f;
 constexpr std::size_t kFewestReadings = 1000;  // below that, nothing can be said about repetition
+constexpr double kFullScaleQuantile = 0.98;    // of the positive readings; the rest is retro-reflectors
 
 double quantile(std::vector<float>& values, double share) {
   const auto rank = static_cast<std::size_t>(std::lround(share * static_cast<double>(values.size() - 1)));
@@ -39,45 +40,54 @@ bool looks_like_ring_and_time(const Scan& scan) {
 
 }  // namespace
 
+void IntensityScaleLearner::add(const Scan& scan) {
+  if (is_settled()) return;
+  for (const Point& p : scan.points) {
+    const auto raw = static_cast<double>(p.intensity);
+    scale_.min_raw = readings_ == 0 ? raw : std::min(scale_.min_raw, raw);
+    scale_.max_raw = readings_ == 0 ? raw : std::max(scale_.max_raw, raw);
+    ++readings_;
+    if (p.intensity > 0.f) positive_.push_back(p.intensity);
+  }
+  has_ring_and_time_ = has_ring_and_time_ || looks_like_ring_and_time(scan);
+  ++scans_;
+  update();
+  if (is_settled()) positive_ = {};
+}
+
+void IntensityScaleLearner::set(const IntensityScale& scale) {
+  scale_ = scale;
+  scans_ = kScans;
+  positive_ = {};
+}
+
+void IntensityScaleLearner::update() {
+  scale_.is_reflectance = true;
+  scale_.warning.clear();
+  if (!positive_.empty()) {
+    scale_.median_raw = quantile(positive_, 0.5);
+    scale_.full_scale = quantile(positive_, kFullScaleQuantile);
+  }
+  if (options_.full_scale > 0.0) scale_.full_scale = options_.full_scale;
+  const auto refuse = [&](const std::string& what) {
+    scale_.is_reflectance = false;
+    scale_.warning = what + ": places are told apart by geometry alone";
+  };
+  if (readings_ > 0 && positive_.empty())
+    refuse("the intensity field holds no positive value");
+  else if (readings_ > 1 && scale_.min_raw == scale_.max_raw)
+    refuse("all intensities are equal (" + std::to_string(scale_.min_raw) + ")");
+  else if (has_ring_and_time_)
+    refuse("the intensity field is no reflectance but holds ring + time, as an odometry front end writes it");
+  else if (readings_ >= kFewestReadings && scale_.median_raw >= scale_.full_scale)
+    scale_.warning = "half of the intensities stand at the upper end (" + std::to_string(scale_.full_scale) +
+                     "): they tell little about places";
+}
+
 IntensityScale estimate_intensity_scale(std::span<const Scan> sample, const IntensityOptions& options) {
-  IntensityScale scale;
-  std::vector<float> positive;
-  std::size_t readings = 0;
-  bool first = true;
-  bool ring_and_time = false;
-  for (const Scan& scan : sample) {
-    readings += scan.points.size();
-    for (const Point& p : scan.points) {
-      const auto raw = static_cast<double>(p.intensity);
-      scale.min_raw = first ? raw : std::min(scale.min_raw, raw);
-      scale.max_raw = first ? raw : std::max(scale.max_raw, raw);
-      first = false;
-      if (p.intensity > 0.f) positive.push_back(p.intensity);
-    }
-    ring_and_time = ring_and_time || looks_like_ring_and_time(scan);
-  }
-  if (!positive.empty()) {
-    scale.median_raw = quantile(positive, 0.5);
-    scale.full_scale = quantile(positive, options.full_scale_quantile);
-  }
-  if (options.full_scale > 0.0) scale.full_scale = options.full_scale;
-  if (readings > 0 && positive.empty()) {
-    scale.is_reflectance = false;
-    scale.warning = "the intensity field holds no positive value: places are told apart by geometry alone";
-  } else if (readings > 1 && scale.min_raw == scale.max_raw) {
-    scale.is_reflectance = false;
-    scale.warning =
-        "all intensities are equal (" + std::to_string(scale.min_raw) + "): places are told apart by geometry alone";
-  } else if (ring_and_time) {
-    scale.is_reflectance = false;
-    scale.warning =
-        "the intensity field is no reflectance: it holds ring + time, as an odometry front end writes it; places are "
-        "told apart by geometry alone";
-  } else if (readings >= kFewestReadings && scale.median_raw >= scale.full_scale) {
-    scale.warning = "half of the intensities stand at the upper end (" + std::to_string(scale.full_scale) +
-                    "): they tell little about places";
-  }
-  return scale;
+  IntensityScaleLearner learner(options);
+  for (const Scan& scan : sample) learner.add(scan);
+  return learner.scale();
 }
 
 void normalise_intensity(Scan& scan, const IntensityScale& scale, const IntensityCalibration& calibration,

@@ -19,8 +19,33 @@ struct IntensityScale {
   std::string warning;                                    ///< empty, or what is wrong with the field
 };
 
-/// Decides the scale from a sample of a recording's scans, once for all of them: a quantile of the positive readings,
-/// so that a heavy tail (retro-reflectors) does not squeeze the rest into darkness. Deterministic.
+/// Learns the scale from the first scans of a sensor and keeps it from then on: a quantile of the positive readings, so
+/// that a heavy tail (retro-reflectors) does not squeeze the rest into darkness. Deterministic.
+class IntensityScaleLearner {
+ public:
+  explicit IntensityScaleLearner(const IntensityOptions& options) : options_(options) {}
+  /// The scans that a scale is learnt from: as many as `revisit detect` takes, spread over a recording.
+  static constexpr std::size_t kScans = 10;
+
+  /// From the scan number kScans on, nothing is learnt any more.
+  void add(const Scan& scan);
+  /// A scale that is known from elsewhere.
+  void set(const IntensityScale& scale);
+  /// Of the scans so far.
+  const IntensityScale& scale() const { return scale_; }
+  bool is_settled() const { return scans_ >= kScans; }
+
+ private:
+  void update();
+
+  IntensityOptions options_;
+  IntensityScale scale_;
+  std::vector<float> positive_;
+  std::size_t scans_ = 0, readings_ = 0;
+  bool has_ring_and_time_ = false;
+};
+
+/// The scale of a sample of scans. Deterministic.
 IntensityScale estimate_intensity_scale(std::span<const Scan> sample, const IntensityOptions& options);
 
 /// Calibrates (phi of eq. 1) and normalises all intensities in place: eta <- min(1, phi(eta, d) / full_scale).

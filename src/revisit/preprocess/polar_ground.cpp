@@ -5,6 +5,7 @@
 
 #include <revisit/core/fast_math.hpp>
 #include <revisit/core/pose.hpp>
+#include <revisit/preprocess/ground.hpp>
 #include <revisit/preprocess/internal/polar_ground.hpp>
 
 namespace revisit::preprocess_internal {
@@ -37,7 +38,7 @@ std::vector<std::uint8_t> polar_ground(const Scan& scan, const PreprocessOptions
   auto tenth = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 10);
   std::nth_element(heights.begin(), tenth, heights.end());
   const float start_height = *tenth;
-  const float steepest = static_cast<float>(std::tan(to_radians(options.ground_slope_deg)));
+  const float steepest = static_cast<float>(std::tan(to_radians(GroundConstants::kSlope_deg)));
   std::vector<float> ground(kSectors * cells, -kUnknown);
   for (std::size_t sector = 0; sector < kSectors; ++sector) {
     float height = start_height;

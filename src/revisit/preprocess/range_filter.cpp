@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/preprocess/range_filter.hpp>
 
+#include <cmath>
+
 namespace revisit {
 
 void filter_range(Scan& scan, const PreprocessOptions& options) {
@@ -14,12 +16,14 @@ void filter_range(Scan& scan, const PreprocessOptions& options) {
   const std::size_t count = scan.points.size();
   std::size_t kept = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    const Point p = points[i];
+    Point p = points[i];
+    // A reading that is no number (NaN, infinite) reads as no intensity.
+    p.intensity = std::isfinite(p.intensity) ? p.intensity : 0.f;
     const float range2 = p.x * p.x + p.y * p.y + p.z * p.z;
     points[kept] = p;
     if (rings != nullptr) rings[kept] = rings[i];
     if (times != nullptr) times[kept] = times[i];
-    kept += static_cast<std::size_t>((range2 >= min2) & (range2 <= max2));
+    kept += static_cast<std::size_t>((range2 > 0.f) & (range2 >= min2) & (range2 <= max2));
   }
   scan.points.resize(kept);
   if (rings != nullptr) scan.rings.resize(kept);

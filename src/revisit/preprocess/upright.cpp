@@ -82,4 +82,13 @@ Eigen::Vector3f find_up(std::span<const Point> points) {
   return !is_level && is_ground(up, plane[3], *around, on_it) ? up : straight;
 }
 
+void rotate(std::span<Point> points, const Pose& T_new_old) {
+  const Eigen::Matrix3f R = T_new_old.linear().cast<float>();
+  if (R.isIdentity(0.f)) return;
+  for (Point& p : points) {
+    const Eigen::Vector3f q = R * Eigen::Vector3f(p.x, p.y, p.z);
+    p = {q.x(), q.y(), q.z(), p.intensity};
+  }
+}
+
 }  // namespace revisit

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include <revisit/core/pose.hpp>
 #include <revisit/core/scan.hpp>
 
 namespace revisit {
@@ -13,5 +14,8 @@ namespace revisit {
 /// 40 degrees of tilt. Straight along z where the ground is within 8 degrees of level, as under a car, or is not to be
 /// seen. The same points give the same answer.
 Eigen::Vector3f find_up(std::span<const Point> points);
+
+/// Turns all points about the sensor, in place; left untouched by the identity.
+void rotate(std::span<Point> points, const Pose& T_new_old);
 
 }  // namespace revisit

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
-#include <mutex>
 #include <optional>
 #include <vector>
 
@@ -32,23 +30,5 @@ Features compute_features(const SurfaceCloud& cloud, double radius_m);
 /// Nothing where fewer than ten matches agree.
 std::optional<FeatureAlignment> align_features(const SurfaceCloud& target, const Features& target_features,
                                                const SurfaceCloud& source, const Features& source_features);
-
-/// A scan as registration meets it: its surface, and its features as soon as somebody asks for them. Safe to share
-/// between threads.
-class ScanGeometry {
- public:
-  explicit ScanGeometry(ThinCloud cloud) : surface_(std::move(cloud)) {}
-  const SurfaceCloud& surface() const { return surface_; }
-  /// Computed on the first call, with that call's radius.
-  const Features& features(double radius_m) const {
-    std::call_once(*once_, [&] { features_ = compute_features(surface_, radius_m); });
-    return features_;
-  }
-
- private:
-  SurfaceCloud surface_;
-  mutable Features features_;
-  std::unique_ptr<std::once_flag> once_ = std::make_unique<std::once_flag>();
-};
 
 }  // namespace revisit

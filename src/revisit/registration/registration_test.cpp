@@ -8,6 +8,7 @@
 #include <pcl/registration/gicp.h>
 #include <pcl/registration/icp.h>
 
+#include <revisit/registration/agreement.hpp>
 #include <revisit/registration/feature_alignment.hpp>
 #include <revisit/registration/icp.hpp>
 

@@ -70,8 +70,8 @@ TEST_F(PlaceFile, AnswersAsTheIndexThatWasSavedAndGrowsOn) {
     for (int more = 0; more < 2; ++more) {  // as it was, then with another place in each
       ASSERT_EQ(opened->size(), saved.size());
       for (const unsigned seed : {3u, 699u, 5000u}) {
-        const auto expected = *saved.search(FrameId{100000}, 1e6, small_context(seed));
-        const auto found = opened->search(FrameId{100000}, 1e6, small_context(seed));
+        const auto expected = *saved.search(small_context(seed), saved.size());
+        const auto found = opened->search(small_context(seed), opened->size());
         ASSERT_TRUE(found);
         ASSERT_EQ(found->size(), expected.size());
         for (std::size_t i = 0; i < expected.size(); ++i) {
@@ -114,7 +114,7 @@ TEST_F(PlaceFile, AnAlteredImageIsNoticedByTheSearchThatMeetsIt) {
   altered[4096 + 40 * 4096 + 500] ^= 1;  // after the header and the bounds of the first chunk
   const auto index = PlaceIndex::open(written(altered), options());
   ASSERT_TRUE(index) << "images are checked on first use";
-  const auto found = index->search_all(small_context(5));
+  const auto found = index->search(small_context(5), index->size());
   ASSERT_FALSE(found);
   EXPECT_NE(found.error().message.find("other.places: places 0 to 4095"), std::string::npos) << found.error().message;
   EXPECT_FALSE(index->find(FrameId{0}));

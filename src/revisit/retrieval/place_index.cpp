@@ -11,9 +11,6 @@
 namespace revisit {
 namespace {
 
-// A hair of tolerance, so that "30 s before" holds for times that were rounded to microseconds.
-constexpr double kTimeTolerance_s = 1e-6;
-
 // The largest distance whose score passes, as far as it follows from the distance alone.
 std::uint32_t farthest_distance(double min_score, const DescriptorView& query) {
   if (query.levels > 0) return UINT32_MAX;
@@ -63,32 +60,21 @@ void PlaceIndex::add(FrameId frame, double stamp_s, const IntensityScanContext& 
 
 std::size_t PlaceIndex::size() const { return store_->size(); }
 
-// Frames increase and latest stamps do not decrease: the allowed past is the beginning of the index.
-std::size_t PlaceIndex::old_enough(FrameId frame, double stamp_s) const {
+FrameId PlaceIndex::frame(std::size_t place) const { return store_->frame(place); }
+
+// Frames increase and latest stamps do not decrease: the searchable past is the beginning of the index.
+std::size_t PlaceIndex::searchable(const FrameTime& query) const {
   return prefix(store_->size(), [&](std::size_t i) {
-    return frame.value - store_->frame(i).value >= options_.exclude_frames &&
-           stamp_s - store_->latest_s(i) >= options_.exclude_s - kTimeTolerance_s;
+    return options_.allows(query, {store_->frame(i), store_->latest_s(i)});
   });
 }
 
-std::optional<FrameId> PlaceIndex::newest_searchable(FrameId frame, double stamp_s) const {
-  const std::size_t places = old_enough(frame, stamp_s);
-  if (places == 0) return std::nullopt;
-  return store_->frame(places - 1);
+std::size_t PlaceIndex::until(FrameId newest) const {
+  return prefix(store_->size(), [&](std::size_t i) { return store_->frame(i) <= newest; });
 }
 
-Result<std::vector<LoopCandidate>> PlaceIndex::search(FrameId frame, double stamp_s, const IntensityScanContext& query,
+Result<std::vector<LoopCandidate>> PlaceIndex::search(const IntensityScanContext& query, std::size_t places,
                                                       int threads, SearchEffort* effort) const {
-  return rank(old_enough(frame, stamp_s), query, threads, effort);
-}
-
-Result<std::vector<LoopCandidate>> PlaceIndex::search_all(const IntensityScanContext& query, int threads,
-                                                          SearchEffort* effort) const {
-  return rank(store_->size(), query, threads, effort);
-}
-
-Result<std::vector<LoopCandidate>> PlaceIndex::rank(std::size_t places, const IntensityScanContext& query, int threads,
-                                                    SearchEffort* effort) const {
   if (places > 0 &&
       (query.rings != store_->rings() || query.sectors != store_->sectors() || query.levels != store_->levels()))
     throw std::invalid_argument("descriptors of different grids cannot be compared");

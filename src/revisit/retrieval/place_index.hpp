@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <revisit/config/parameters.hpp>
+#include <revisit/core/exclusion.hpp>
 #include <revisit/core/loop.hpp>
 #include <revisit/core/result.hpp>
 #include <revisit/descriptors/intensity_scan_context.hpp>
@@ -18,7 +19,7 @@ class PlaceStore;
 
 /// How much of an index a search looked at.
 struct SearchEffort {
-  std::size_t places = 0;  ///< old enough to be searched
+  std::size_t places = 0;  ///< that were to be searched
   std::size_t compared =
       0;  ///< whose occupancy images were compared; the others were excluded by a bound, without loss
 };
@@ -40,18 +41,20 @@ class PlaceIndex {
   /// A frame that does not increase, or a descriptor of another grid than the first, throws std::invalid_argument.
   void add(FrameId frame, double stamp_s, const IntensityScanContext& descriptor);
 
-  /// The best places for a query at `frame` and `stamp_s`, best first by geometry plus intensity score (ties: the
-  /// earlier frame). Searched are places at least exclude_frames frames and exclude_s seconds before the query; where
-  /// stamps run backwards, a place counts as old as the latest before it. `threads` share the work.
-  Result<std::vector<LoopCandidate>> search(FrameId frame, double stamp_s, const IntensityScanContext& query,
-                                            int threads = 1, SearchEffort* effort = nullptr) const;
+  /// Places are searched by prefix: the first so many that were added. Those old enough for a query at this frame and
+  /// time (ExclusionRule; where stamps run backwards, a place counts as old as the latest before it):
+  std::size_t searchable(const FrameTime& query) const;
+  /// Those of frames up to `newest`.
+  std::size_t until(FrameId newest) const;
+  /// All.
+  std::size_t size() const;
+  /// The frame of the place added as number `place`, below size().
+  FrameId frame(std::size_t place) const;
 
-  /// The same over all places, whatever their age: a query that is no part of the recording.
-  Result<std::vector<LoopCandidate>> search_all(const IntensityScanContext& query, int threads = 1,
-                                                SearchEffort* effort = nullptr) const;
-
-  /// The newest place that is old enough for a query at this frame and time, if there is any.
-  std::optional<FrameId> newest_searchable(FrameId frame, double stamp_s) const;
+  /// The best of the first `places` places, best first by geometry plus intensity score (ties: the earlier frame).
+  /// `threads` share the work.
+  Result<std::vector<LoopCandidate>> search(const IntensityScanContext& query, std::size_t places, int threads = 1,
+                                            SearchEffort* effort = nullptr) const;
 
   /// The descriptor of a frame, valid as long as the index. None where the file it lies in was altered.
   std::optional<DescriptorView> find(FrameId frame) const;
@@ -63,14 +66,10 @@ class PlaceIndex {
   static Result<PlaceIndex> open(const std::string& path, const RetrievalOptions& options);
   /// Reads all that open() left to be checked on first use.
   Status check() const;
-  std::size_t size() const;
 
  private:
   using Store = retrieval_internal::PlaceStore;
   PlaceIndex(const RetrievalOptions& options, std::unique_ptr<Store> store);
-  Result<std::vector<LoopCandidate>> rank(std::size_t places, const IntensityScanContext& query, int threads,
-                                          SearchEffort* effort) const;
-  std::size_t old_enough(FrameId frame, double stamp_s) const;
 
   RetrievalOptions options_;
   std::unique_ptr<Store> store_;

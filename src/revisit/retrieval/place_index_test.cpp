@@ -31,21 +31,23 @@ TEST(PlaceIndex, ExcludesTheRecentPastByFramesAndByTime) {
   const PlaceIndex index = filled(options, 200);
   const auto latest = [&](int frame, double stamp_s) {
     std::int64_t last = -1;
-    const auto found = index.search(FrameId{frame}, stamp_s, random_context(7));
+    const auto found = index.search(random_context(7), index.searchable({FrameId{frame}, stamp_s}));
     for (const auto& each : *found) last = std::max(last, each.match.value);
     return last;
   };
   EXPECT_EQ(latest(200, 20.0), 120) << "8 s are 80 frames here";
   EXPECT_EQ(latest(200, 100.0), 150) << "50 frames";
   EXPECT_EQ(latest(79, 7.9), -1);
-  EXPECT_FALSE(index.newest_searchable(FrameId{79}, 7.9));
-  ASSERT_TRUE(index.newest_searchable(FrameId{85}, 8.5));
-  EXPECT_EQ(index.newest_searchable(FrameId{85}, 8.5)->value, 5);
+  EXPECT_EQ(index.searchable({FrameId{79}, 7.9}), 0u);
+  ASSERT_EQ(index.searchable({FrameId{85}, 8.5}), 6u);
+  EXPECT_EQ(index.frame(5).value, 5);
+  EXPECT_EQ(index.until(FrameId{7}), 8u);
+  EXPECT_EQ(index.until(FrameId{700}), 200u);
 }
 
 TEST(PlaceIndex, TheFirstPlaceCanBeFound) {
   const PlaceIndex index = filled({}, 100);
-  const auto found = *index.search(FrameId{500}, 500.0, random_context(0));
+  const auto found = *index.search(random_context(0), index.size());
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].match.value, 0);
   EXPECT_DOUBLE_EQ(found[0].geometry_score, 1.0);
@@ -63,7 +65,7 @@ TEST(PlaceIndex, RanksAsComparingAllByHand) {
   for (int i = 0; i < 120; ++i)
     by_hand.emplace_back(-match_descriptors(query, random_context(static_cast<unsigned>(i))).score(), i);
   std::sort(by_hand.begin(), by_hand.end());
-  const auto found = *index.search_all(query);
+  const auto found = *index.search(query, index.size());
   ASSERT_EQ(found.size(), 10u);
   for (std::size_t i = 0; i < found.size(); ++i) {
     EXPECT_EQ(found[i].match.value, by_hand[i].second);
@@ -76,9 +78,9 @@ TEST(PlaceIndex, OfPlacesFewFramesApartTheBestIsReturned) {
   options.shortlist = 0;
   options.top_k = 1000;
   options.separation_frames = 0;
-  const auto all = filled(options, 100).search_all(random_context(5));
+  const auto all = filled(options, 100).search(random_context(5), 100);
   options.separation_frames = 8;
-  const auto apart = filled(options, 100).search_all(random_context(5));
+  const auto apart = filled(options, 100).search(random_context(5), 100);
   EXPECT_EQ((*apart)[0].match, (*all)[0].match);
   EXPECT_GE(apart->size(), 6u);
   for (std::size_t i = 0; i < apart->size(); ++i)
@@ -96,13 +98,13 @@ TEST(PlaceIndex, GatesAndShortlistAreKept) {
   options.top_k = 1000;
   options.separation_frames = 0;
   options.shortlist = 7;
-  EXPECT_EQ(filled(options, 100).search_all(random_context(5))->size(), 7u);
+  EXPECT_EQ(filled(options, 100).search(random_context(5), 100)->size(), 7u);
   options.shortlist = 0;
   options.min_geometry_score = 0.999;
-  EXPECT_EQ(filled(options, 100).search_all(random_context(5))->size(), 1u) << "itself alone";
+  EXPECT_EQ(filled(options, 100).search(random_context(5), 100)->size(), 1u) << "itself alone";
   options.min_geometry_score = 0.0;
   options.min_intensity_score = 0.999;
-  EXPECT_EQ(filled(options, 100).search_all(random_context(5))->size(), 1u);
+  EXPECT_EQ(filled(options, 100).search(random_context(5), 100)->size(), 1u);
 }
 
 TEST(PlaceIndex, MisuseThrows) {

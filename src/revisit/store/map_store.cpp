@@ -71,7 +71,7 @@ struct MapStore::Database {
     return {file + ": row " + std::to_string(row) + " of its " + what + " is damaged"};
   }
   Status begin() {
-    // SQLite may end a transaction by itself (a full disk): it is asked, not remembered.
+    // SQLite may end a transaction by itself (a full disk): its own state counts.
     return is_in_transaction() ? ok() : run("BEGIN");
   }
   bool is_in_transaction() const { return sqlite3_get_autocommit(handle.get()) == 0; }
@@ -97,9 +97,12 @@ MapStore::MapStore(MapStore&&) noexcept = default;
 MapStore& MapStore::operator=(MapStore&&) noexcept = default;
 MapStore::~MapStore() = default;
 
+// SQLite takes an empty name for a temporary file that goes with its handle.
+Result<MapStore> MapStore::create_temporary() { return create({}); }
+
 Result<MapStore> MapStore::create(const std::filesystem::path& file) {
   std::error_code failure;
-  if (std::filesystem::exists(file, failure)) return Error{file.string() + ": exists already"};
+  if (!file.empty() && std::filesystem::exists(file, failure)) return Error{file.string() + ": exists already"};
   auto database = Database::connect(file, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
   if (!database) return database.error();
   if (const Status status = (*database)->journal(); !status) return status.error();
@@ -137,7 +140,7 @@ Status MapStore::add(const StoredKeyframe& keyframe) {
       .bind(keyframe.frame.value)
       .bind(keyframe.stamp_s)
       .bind(std::as_bytes(std::span(pose)))
-      .bind(std::int64_t{keyframe.starts_anew})
+      .bind(std::int64_t{keyframe.starts_segment})
       .bind(keyframe.descriptor)
       .bind(keyframe.place)
       .bind(keyframe.cloud)
@@ -161,9 +164,7 @@ Status MapStore::add(const StoredEdge& edge) {
   if (const Status begun = database_->begin(); !begun) return begun;
   const auto pose = numbers_of(edge.T_from_to);
   std::array<std::optional<double>, 4> of_loop{};
-  if (edge.loop)
-    of_loop = {edge.loop->score, edge.loop->constraint.inlier_ratio, edge.loop->constraint.rmse_m,
-               edge.loop->constraint.probability};
+  if (edge.loop) of_loop = {edge.loop->score, edge.loop->inlier_ratio, edge.loop->rmse_m, edge.loop->probability};
   Statement statement = database_->prepare(
       "INSERT INTO edges(from_frame,to_frame,T_from_to,information,score,inlier_ratio,rmse_m,probability) "
       "VALUES(?,?,?,?,?,?,?,?)");
@@ -186,7 +187,7 @@ Status MapStore::add(const CandidateRow& answer) {
 
 Status MapStore::commit() { return database_->is_in_transaction() ? database_->run("COMMIT") : ok(); }
 
-Status MapStore::take_back() { return database_->is_in_transaction() ? database_->run("ROLLBACK") : ok(); }
+Status MapStore::roll_back() { return database_->is_in_transaction() ? database_->run("ROLLBACK") : ok(); }
 
 Status MapStore::set_note(const std::string& name, const std::string& text) {
   if (const Status begun = database_->begin(); !begun) return begun;
@@ -242,9 +243,8 @@ Result<std::vector<StoredEdge>> MapStore::edges() const {
     if (!pose || !information) return database_->damaged("edges", statement.integer(8));
     StoredEdge edge{{statement.integer(0)}, {statement.integer(1)}, *pose, *information, {}};
     if (!statement.is_null(4))
-      edge.loop = LoopRow{LoopConstraint{edge.to, edge.from, edge.T_from_to, statement.real(5), statement.real(6),
-                                         statement.real(7), edge.information},
-                          statement.real(4)};
+      edge.loop = LoopConstraint{edge.to,           edge.from,         edge.T_from_to,    statement.real(5),
+                                 statement.real(6), statement.real(7), statement.real(4), edge.information};
     rows.push_back(edge);
   }
   if (const Status status = statement.status(); !status) return status.error();

@@ -8,9 +8,10 @@
 #include <string>
 #include <vector>
 
+#include <revisit/core/candidate_row.hpp>
+#include <revisit/core/loop.hpp>
 #include <revisit/core/pose.hpp>
 #include <revisit/core/result.hpp>
-#include <revisit/core/results.hpp>
 
 namespace revisit {
 
@@ -21,7 +22,7 @@ struct StoredKeyframe {
   FrameId frame;
   double stamp_s = 0.0;
   Pose T_odom_lidar = Pose::Identity();
-  bool starts_anew = false;  ///< tracking was lost before: how it lies to the key frames before is not known
+  bool starts_segment = false;  ///< tracking was lost before: how it lies to the key frames before is not known
   /// Empty where the place was known already.
   Bytes descriptor, place, cloud;
 };
@@ -40,13 +41,17 @@ struct StoredEdge {
   FrameId from, to;
   Pose T_from_to = Pose::Identity();
   Matrix6 information = Matrix6::Identity();  ///< as in LoopConstraint
-  std::optional<LoopRow> loop;                ///< where it is one: `to` is the query
+  std::optional<LoopConstraint> loop;         ///< where it is one: `to` is the query
 };
 
 /// A map on disk (SQLite), which grows while it is made. What was committed survives whatever happens to the program.
 /// Belongs to one thread at a time.
 class MapStore {
  public:
+  /// The map in the folder of a `revisit slam`.
+  static constexpr const char* kFileName = "map.sqlite";
+  /// A map that lasts as long as the program, on the disk as far as it is large.
+  static Result<MapStore> create_temporary();
   /// An existing file is an error.
   static Result<MapStore> create(const std::filesystem::path& file);
   /// Refused are files that are no map, or of another version.
@@ -61,10 +66,10 @@ class MapStore {
   Status add(const CandidateRow& answer);
   /// Everything added since the last commit becomes part of the map, or none of it does.
   Status commit();
-  /// Everything added since the last commit is forgotten.
-  Status take_back();
+  /// Nothing added since the last commit becomes part of the map.
+  Status roll_back();
 
-  /// A note to remember: which recording, which parameters. A second one of the same name replaces the first.
+  /// A note beside the map: which recording, which parameters. A second one of the same name replaces the first.
   Status set_note(const std::string& name, const std::string& text);
   Result<std::optional<std::string>> note(const std::string& name) const;
 
@@ -77,7 +82,7 @@ class MapStore {
   enum class Part { kDescriptor, kPlace, kCloud };
   /// Empty where the place was known already. An unknown frame is an error.
   Result<Bytes> part(FrameId keyframe, Part part) const;
-  /// What to say of bytes that cannot be read: names the file, the part and the key frame.
+  /// The error for bytes that cannot be read: names the file, the part and the key frame.
   Error damaged(const char* part, FrameId keyframe) const;
 
  private:

@@ -37,7 +37,7 @@ TEST(MapStore, GivesBackWhatItWasGiven) {
     ASSERT_TRUE(store->add(StoredScan{{5}, {4}, 0.5, some_pose(2.0), some_pose(3.0), false}));
     StoredEdge edge{{4}, {9}, some_pose(4.0), 2.0 * Matrix6::Identity(), {}};
     ASSERT_TRUE(store->add(edge));
-    edge.loop = LoopRow{{{9}, {4}, edge.T_from_to, 0.8, 0.1, 0.99, edge.information}, 1.5};
+    edge.loop = LoopConstraint{{9}, {4}, edge.T_from_to, 0.8, 0.1, 0.99, 1.5, edge.information};
     ASSERT_TRUE(store->add(edge));
     ASSERT_TRUE(store->add(CandidateRow{{9}, FrameId{4}, 1.5, true, ""}));
     ASSERT_TRUE(store->add(CandidateRow{{10}, std::nullopt, 0.0, false, "no place like it"}));
@@ -64,8 +64,8 @@ TEST(MapStore, GivesBackWhatItWasGiven) {
   ASSERT_EQ(edges->size(), 2u);
   EXPECT_FALSE((*edges)[0].loop);
   ASSERT_TRUE((*edges)[1].loop);
-  EXPECT_EQ((*edges)[1].loop->constraint.query, FrameId{9});
-  EXPECT_EQ((*edges)[1].loop->constraint.rmse_m, 0.1);
+  EXPECT_EQ((*edges)[1].loop->query, FrameId{9});
+  EXPECT_EQ((*edges)[1].loop->rmse_m, 0.1);
   EXPECT_EQ((*edges)[1].information, 2.0 * Matrix6::Identity());
   const auto answers = store->answers();
   ASSERT_TRUE(answers);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/verification/temporal.hpp>
 
-#include <revisit/core/text.hpp>
 #include <revisit/descriptors/similarity.hpp>
 
 namespace revisit {
@@ -14,9 +13,9 @@ struct Mean {
 };
 
 Mean mean_score(FrameId query, FrameId match, int direction, const DescriptorLookup& query_descriptor,
-                const DescriptorLookup& match_descriptor, int frames) {
+                const DescriptorLookup& match_descriptor) {
   Mean mean;
-  for (int k = 1; k <= frames; ++k) {
+  for (int k = 1; k <= kTemporalPairs; ++k) {
     const auto q = query_descriptor(FrameId{query.value - k});
     const auto m = match_descriptor(FrameId{match.value - std::int64_t{direction} * k});
     if (!q || !m) continue;
@@ -30,8 +29,8 @@ Mean mean_score(FrameId query, FrameId match, int direction, const DescriptorLoo
 
 TemporalEvidence check_temporal(FrameId query, FrameId match, const DescriptorLookup& query_descriptor,
                                 const DescriptorLookup& match_descriptor, const TemporalOptions& options) {
-  const Mean forward = mean_score(query, match, 1, query_descriptor, match_descriptor, options.frames);
-  const Mean reverse = mean_score(query, match, -1, query_descriptor, match_descriptor, options.frames);
+  const Mean forward = mean_score(query, match, 1, query_descriptor, match_descriptor);
+  const Mean reverse = mean_score(query, match, -1, query_descriptor, match_descriptor);
   TemporalEvidence evidence;
   evidence.forward_pairs = forward.pairs;
   evidence.reverse_pairs = reverse.pairs;
@@ -39,10 +38,8 @@ TemporalEvidence check_temporal(FrameId query, FrameId match, const DescriptorLo
   evidence.reverse_score = reverse.value();
   evidence.reverse = evidence.reverse_score > evidence.forward_score;
   evidence.score = evidence.reverse ? evidence.reverse_score : evidence.forward_score;
-  if (forward.pairs + reverse.pairs > 0 && evidence.score < options.min_score) {
-    evidence.consistent = false;
-    evidence.reason = format("temporal consistency %.3f below %.3f", evidence.score, options.min_score);
-  }
+  if (forward.pairs + reverse.pairs > 0 && evidence.score < options.min_score)
+    evidence.refusal = Refusal{Refusal::Reason::kTemporallyInconsistent, evidence.score, options.min_score};
   return evidence;
 }
 

@@ -42,7 +42,7 @@ TEST_F(TemporalConsistency, ForwardVisit) {
   EXPECT_EQ(evidence.forward_pairs, 5);
   EXPECT_NEAR(evidence.score, 2.0, 1e-9);
   EXPECT_FALSE(evidence.reverse);
-  EXPECT_TRUE(evidence.consistent);
+  EXPECT_FALSE(evidence.refusal);
 }
 
 TEST_F(TemporalConsistency, ReverseVisitRunsTheCandidatesIndexTheOtherWay) {
@@ -54,9 +54,11 @@ TEST_F(TemporalConsistency, ReverseVisitRunsTheCandidatesIndexTheOtherWay) {
 
 TEST_F(TemporalConsistency, AWrongPlaceIsRefusedWithItsScore) {
   const TemporalEvidence evidence = check(107, 2);
-  EXPECT_FALSE(evidence.consistent);
-  EXPECT_NE(evidence.reason.find("below 1.800"), std::string::npos) << evidence.reason;
-  EXPECT_TRUE(check(107, 2, 0.0).consistent) << "a threshold of 0 never refuses";
+  ASSERT_TRUE(evidence.refusal);
+  EXPECT_EQ(evidence.refusal->reason, Refusal::Reason::kTemporallyInconsistent);
+  EXPECT_DOUBLE_EQ(evidence.refusal->value, evidence.score);
+  EXPECT_DOUBLE_EQ(evidence.refusal->limit, 1.8);
+  EXPECT_FALSE(check(107, 2, 0.0).refusal) << "a threshold of 0 never refuses";
 }
 
 TEST_F(TemporalConsistency, IsThePlainMeanOfThePairsThatExist) {
@@ -71,7 +73,7 @@ TEST_F(TemporalConsistency, IsThePlainMeanOfThePairsThatExist) {
 TEST_F(TemporalConsistency, WithoutPairsThereIsNothingToRefuseBy) {
   const TemporalEvidence evidence = check(100, 5);  // frames 95..99 do not exist
   EXPECT_EQ(evidence.forward_pairs + evidence.reverse_pairs, 0);
-  EXPECT_TRUE(evidence.consistent);
+  EXPECT_FALSE(evidence.refusal);
 }
 
 }  // namespace

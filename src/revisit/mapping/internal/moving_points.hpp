@@ -11,9 +11,9 @@
 namespace revisit::mapping_internal {
 
 /// The nearest range that a key frame saw in each direction, in cells of a degree.
-class RangeImage {
+class VisibilityImage {
  public:
-  explicit RangeImage(std::span<const Point> points);
+  explicit VisibilityImage(std::span<const Point> points);
 
   enum class Verdict : std::uint8_t { kUnknown, kThrough, kSurface };
   /// `p` in the key frame's frame. It was seen through where all around its direction lies beyond it.
@@ -24,15 +24,15 @@ class RangeImage {
       ranges_m_;  ///< [azimuth][elevation], the least of a cell and those around it; 0: nothing came back
 };
 
-/// What a key frame looks like to those before and after it.
-struct Onlooker {
+/// A key frame that looks at the points of another one.
+struct Observer {
   Pose T_world_lidar = Pose::Identity();
-  const RangeImage* image = nullptr;
+  const VisibilityImage* image = nullptr;
 };
 
-/// Which of the points, in the frame of `T_world_lidar`, stood there for a moment only: more onlookers saw through them
+/// Which of the points, in the frame of `T_world_lidar`, stood there for a moment only: more observers saw through them
 /// than saw something there. 1: moving.
 std::vector<std::uint8_t> find_moving(std::span<const Point> points, const Pose& T_world_lidar,
-                                      std::span<const Onlooker> onlookers);
+                                      std::span<const Observer> observers);
 
 }  // namespace revisit::mapping_internal

@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <iostream>
+#include <memory>
+#include <optional>
+
+#include <revisit/core/stopwatch.hpp>
+#include <revisit/io/pose_file.hpp>
+#include <revisit/io/result_files.hpp>
+#include <revisit/pipeline/recording_scale.hpp>
+#include <revisit/pipeline/slam.hpp>
+#include <revisit/preprocess/undistort.hpp>
+
+#include "common.hpp"
+#include "pictures/map_picture.hpp"
+#include "progress.hpp"
+#include "read_ahead.hpp"
+#include "reports/run_file.hpp"
+
+namespace revisit::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct SlamOptions {
+  std::string input, out, poses, calibration, odometry, wheels;
+  double sweep_s = 0.0;
+  bool overwrite = false, resume = false, without_map = false;
+  ParameterFlags parameters;
+};
+
+// The poses that stand in for, or help, the tracking of scans; empty where there are none.
+Result<Trajectory> other_odometry(const SlamOptions& options, const Recording& recording) {
+  const std::string& file = options.odometry.empty() ? options.wheels : options.odometry;
+  if (file == "none") return Trajectory();
+  if (file.empty()) return recording.wheel_odometry();
+  if (file == "wheels") {
+    if (recording.wheel_odometry().empty()) return Error{options.input + ": has no wheel odometry"};
+    return recording.wheel_odometry();
+  }
+  const auto poses = read_poses(file);
+  if (!poses) return poses.error();
+  auto trajectory = to_trajectory(*poses, recording.T_camera_lidar(), stamps_of(recording));
+  if (trajectory.empty()) return Error{file + ": no pose belongs to a frame of the recording"};
+  return trajectory;
+}
+
+// A map is not continued with another recording.
+Status check_note(MapStore& store, const std::string& name, const std::string& value, const std::string& what) {
+  const auto noted = store.note(name);
+  if (!noted) return noted.error();
+  if (!*noted) return store.set_note(name, value);
+  if (**noted == value) return ok();
+  return Error{std::string(MapStore::kFileName) + ": was made with " + what + " '" + **noted + "', not '" + value +
+               "'"};
+}
+
+// What must stay as it was when the map was begun.
+std::string parameters_text(const Parameters& parameters, const SlamOptions& options) {
+  std::string text = "odometry=" + options.odometry + " wheels=" + options.wheels +
+                     " calibration=" + options.calibration + " sweep=" + std::to_string(options.sweep_s);
+  for (const ParameterInfo& info : parameter_infos())
+    if (info.name.starts_with("preprocess.") || info.name.starts_with("intensity.") ||
+        info.name.starts_with("descriptor."))
+      text += " " + info.name + "=" + get_parameter(parameters, info.name);
+  return text;
+}
+
+Result<std::shared_ptr<MapStore>> open_store(const SlamOptions& options) {
+  const fs::path file = fs::path(options.out) / MapStore::kFileName;
+  std::error_code failure;
+  fs::create_directories(options.out, failure);
+  if (failure) return Error{options.out + ": cannot be created: " + failure.message()};
+  const bool exists = fs::exists(file, failure);
+  if (exists && options.overwrite && !options.resume)
+    for (const char* ending : {"", "-wal", "-shm"}) fs::remove(file.string() + ending, failure);
+  else if (exists && !options.resume)
+    return Error{options.out +
+                 ": already holds a map; continue it with --resume, replace it with --overwrite, or name another "
+                 "folder"};
+  auto store = fs::exists(file, failure) ? MapStore::open(file) : MapStore::create(file);
+  if (!store) return store.error();
+  return std::make_shared<MapStore>(*std::move(store));
+}
+
+void count(RunFile& run, const SlamStep& step) {
+  ++run.counts["scans"];
+  run.counts["keyframes"] += step.is_keyframe;
+  run.counts["untracked"] += !step.is_tracked;
+  run.counts["segments_begun"] += step.starts_segment;
+  if (!step.is_tracked) run.untracked.push_back(step.frame.value);
+  run.counts["loops"] += step.loops_entered;
+  for (const auto& [stage, value] : {std::pair{"odometry", step.ms.odometry},
+                                     {"prepare", step.ms.prepare},
+                                     {"detect", step.ms.detect},
+                                     {"graph", step.ms.graph},
+                                     {"store", step.ms.store}})
+    run.ms_total[stage] += value;
+}
+
+Status run_all(Slam& slam, const Recording& recording, const Trajectory& odometry, double sweep_s, RunFile& run) {
+  std::size_t first = 0;
+  if (const auto last = slam.last_frame()) {
+    while (first < recording.size() && recording.frame(first) <= *last) ++first;
+    print_log()(LogLevel::kInfo, "going on after frame " + std::to_string(last->value) + ": " +
+                                     std::to_string(slam.graph().keyframes().size()) + " key frames are there");
+    if (const auto T_odom_lidar = odometry.at(*last)) slam.restore_external(*T_odom_lidar);
+  }
+  Progress progress("slam", "scans", recording.size() - first);
+  ReadAhead scans(recording, first);
+  for (std::size_t i = first; i < recording.size() && !interrupted(); ++i) {
+    Stopwatch watch;
+    auto scan = scans.next();
+    run.ms_total["read"] += watch.lap_ms();
+    if (scan) assume_sweep(*scan, sweep_s);
+    const auto step =
+        scan ? slam.process(*std::move(scan), odometry.at(recording.frame(i))) : Result<SlamStep>(scan.error());
+    if (step) {
+      count(run, *step);
+    } else if (slam.has_failed()) {
+      return step.error();
+    } else {
+      progress.clear();
+      print_log()(LogLevel::kWarning, step.error().message + "; skipped");
+      run.skipped.push_back(step.error().message);
+    }
+    progress.update(i + 1 - first);
+  }
+  run.interrupted = interrupted();
+  return slam.finish();
+}
+
+// "3 to 7, 12": the first few runs of consecutive frames.
+std::string to_ranges(const std::vector<std::int64_t>& frames) {
+  constexpr int kMost = 8;
+  std::string text;
+  int ranges = 0;
+  for (std::size_t begin = 0, end = 0; begin < frames.size(); begin = end) {
+    for (end = begin + 1; end < frames.size() && frames[end] == frames[end - 1] + 1;) ++end;
+    if (++ranges > kMost) return text + ", ...";
+    text += (text.empty() ? "" : ", ") + std::to_string(frames[begin]);
+    if (end - begin > 1) text += " to " + std::to_string(frames[end - 1]);
+  }
+  return text;
+}
+
+Status write_rows(const MapStore& store, ResultWriter& writer) {
+  const auto answers = store.answers();
+  const auto edges = store.edges();
+  if (!answers) return answers.error();
+  if (!edges) return edges.error();
+  for (const CandidateRow& row : *answers)
+    if (const Status status = writer.add(row); !status) return status;
+  for (const StoredEdge& edge : *edges)
+    if (edge.loop)
+      if (const Status status = writer.add(*edge.loop); !status) return status;
+  return writer.finish();
+}
+
+Status write_trajectories(const Slam& slam, const Recording& recording, const fs::path& out) {
+  const auto trajectories = slam.trajectories();
+  if (!trajectories) return trajectories.error();
+  const auto T_camera_lidar = recording.T_camera_lidar();
+  if (T_camera_lidar)
+    if (const Status status = write_camera_calibration(out / "calib.txt", *T_camera_lidar); !status) return status;
+  for (const Status& status : {write_kitti_poses(out / "poses.txt", trajectories->corrected, T_camera_lidar),
+                               write_tum_poses(out / "poses.tum", trajectories->corrected),
+                               write_tum_poses(out / "odometry.tum", trajectories->odometry),
+                               slam.graph().graph().write_g2o(out / "graph.g2o")})
+    if (!status) return status;
+  return ok();
+}
+
+Status write_map(const Slam& slam, const fs::path& out, RunFile& run) {
+  Stopwatch watch;
+  Progress progress("map", "key frames", slam.graph().keyframes().size());
+  const auto report = slam.write_map(out, [&](std::size_t done) {
+    progress.update(done);
+    return true;
+  });
+  if (!report) return report.error();
+  run.counts["map_points"] = report->points;
+  run.counts["moving_points_left_out"] = report->moving;
+  run.ms_total["map"] = watch.lap_ms();
+  return draw_map(out / "map.png", out / "tiles", slam.graph().graph().nodes());
+}
+
+int slam(const SlamOptions& options) {
+  auto parameters = options.parameters.resolve();
+  if (!parameters) return fail(parameters.error(), kUsage);
+  if (!options.odometry.empty() && !options.wheels.empty())
+    return fail({"--odometry and --wheels: the first is taken instead of tracking, the second helps it; name one"},
+                kUsage);
+  const auto calibration = load_calibration(options.calibration);
+  if (!calibration) return fail(calibration.error());
+  const auto recording = open_input(options.input, options.poses, &*parameters);
+  if (!recording) return fail(recording.error());
+  use_frames_alone_without_times(**recording, *parameters);
+  const auto odometry = other_odometry(options, **recording);
+  if (!odometry) return fail(odometry.error());
+  const auto scale = intensity_scale_of(**recording, parameters->intensity);
+  if (!scale) return fail({scale.error().message + "; no scan can be used"});
+  if (!scale->warning.empty()) print_log()(LogLevel::kWarning, options.input + ": " + scale->warning);
+
+  RunFile run;
+  run.command = "slam";
+  run.arguments = program_arguments();
+  run.input = fs::absolute(options.input).lexically_normal().string();
+  run.poses = options.odometry.empty() ? options.wheels : options.odometry;
+  run.calibration = options.calibration;
+  run.parameters = *parameters;
+  run.intensity = *scale;
+
+  const auto store = open_store(options);
+  if (!store) return fail(store.error());
+  if (const Status status = check_note(**store, "input", run.input, "the recording"); !status)
+    return fail(status.error());
+  if (const Status status = check_note(**store, "parameters", parameters_text(*parameters, options), "the parameters");
+      !status)
+    return fail(status.error());
+  const auto source = options.odometry.empty() ? Odometry::Source::kLidar : Odometry::Source::kExternal;
+  auto slam = Slam::open(*store, *parameters, {*scale, *calibration, source, print_log()});
+  if (!slam) return fail(slam.error());
+
+  const fs::path out = options.out;
+  auto writer = ResultWriter::create(out, true);  // whether there was a map is decided above
+  if (!writer) return fail(writer.error());
+  listen_for_interrupt();
+  Stopwatch watch;
+  Status status = run_all(*slam, **recording, *odometry, options.sweep_s, run);
+  run.ms_total["all"] = watch.lap_ms();
+  run.counts["skipped"] = run.skipped.size();
+  // What was found until here is written, whatever happened.
+  const Status rows = write_rows(**store, *writer);
+  const Status poses = slam->graph().keyframes().empty() ? ok() : write_trajectories(*slam, **recording, out);
+  const Status map = slam->graph().keyframes().empty() || options.without_map ? ok() : write_map(*slam, out, run);
+  const Status described = write_run(out / "run.json", run);
+  for (const Status* each : {&std::as_const(status), &rows, &poses, &map, &described})
+    if (!*each) return fail(each->error());
+
+  if (slam->graph().keyframes().empty()) return fail({options.input + ": no scan can be used"});
+  std::cout << run.counts["scans"] << " scans, " << slam->graph().keyframes().size() << " key frames, "
+            << run.counts["loops"] << " loops in the graph, " << run.counts["untracked"] << " scans not tracked, "
+            << run.skipped.size() << " skipped\nTrajectory: " << (out / "poses.tum").string();
+  if (!options.without_map) std::cout << "\nMap: " << (out / "map.ply").string() << ", " << (out / "map.png").string();
+  std::cout << '\n';
+  if (!run.untracked.empty())
+    print_log()(LogLevel::kWarning, "not tracked: frames " + to_ranges(run.untracked) +
+                                        "; their poses are predicted (exit code 3; all of them in run.json)");
+  if (run.interrupted) {
+    print_log()(LogLevel::kWarning, "interrupted: continue with --resume");
+    return kInterrupted;
+  }
+  return run.skipped.empty() && run.counts["untracked"] == 0 ? kDone : kDoneWithReservations;
+}
+
+}  // namespace
+
+Run add_slam(CLI::App& program) {
+  auto options = std::make_shared<SlamOptions>();
+  CLI::App* command = program.add_subcommand("slam", "Turn a recording into a corrected trajectory and a map.");
+  command->footer(
+      "Scans are tracked against what was seen lately, loops correct the drift. Writes into the folder of --out\n"
+      "(formats: docs/formats.md):\n"
+      "  poses.txt/.tum   the corrected trajectory\n"
+      "  odometry.tum     the trajectory before any loop\n"
+      "  map.ply/.pcd     the map, without what moved; map.png shows it, tiles/ holds it in pieces\n"
+      "  graph.g2o        the pose graph\n"
+      "  loops.csv, candidates.csv, run.json   as `revisit detect` writes them, for key frames\n"
+      "  map.sqlite       everything as it is found: an interrupted run continues with --resume\n\n"
+      "Example: revisit slam kitti/sequences/00 --out maps/00\n"
+      "         revisit evaluate maps/00 --reference kitti/poses/00.txt");
+  command->add_option("input", options->input, "Recording, as for `revisit detect`")->required();
+  command->add_option("--out", options->out, "Folder for the results")->required();
+  command->add_option(
+      "--wheels", options->wheels,
+      "Pose file (TUM, KITTI, g2o) of wheel odometry, in the LiDAR's frame, that helps where scans fail "
+      "(default: the recording's wheel_odometry.tum, if any; none: without)");
+  command->add_option("--odometry", options->odometry,
+                      "Pose file of another odometry, taken instead of tracking the scans (wheels: the recording's)");
+  command
+      ->add_option(
+          "--sweep", options->sweep_s,
+          "For points without times whose distortion nobody has undone (KITTI raw): the sensor turns once in so "
+          "many seconds, clockwise from above, and looks ahead at the stamp; negative: the other way round")
+      ->check(CLI::Range(-1.0, 1.0));
+  command->add_option("--poses", options->poses,
+                      "Reference poses (KITTI, TUM, g2o), written into the results for `revisit evaluate`; never used "
+                      "to track or to find loops");
+  command->add_option("--calibration", options->calibration, "Intensity calibration made by `revisit calibrate`");
+  command->add_flag("--resume", options->resume, "Continue the map that is in the folder");
+  command->add_flag("--overwrite", options->overwrite, "Replace the map that is in the folder");
+  command->add_flag("--no-map", options->without_map, "Write the trajectory only");
+  options->parameters.add_to(*command);
+  return [options] { return slam(*options); };
+}
+
+}  // namespace revisit::cli

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <revisit/core/result.hpp>
+
+#include "reports/report.hpp"
+
+namespace revisit::cli {
+
+/// One method's tables 1 and 2, and what it is.
+struct MethodReport {
+  std::string name, source;
+  bool gives_poses = false;  ///< otherwise there is no table 2
+  double ms_per_scan = 0.0;  ///< describing, searching and verifying
+  EvaluationReport evaluation;
+};
+
+/// All methods in one table each, a row a method.
+std::string to_text(const std::vector<MethodReport>& methods);
+std::string to_json(const std::vector<MethodReport>& methods);
+/// Precision over recall of all of them.
+Status draw_comparison(const std::filesystem::path& file, const std::vector<MethodReport>& methods);
+
+}  // namespace revisit::cli

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/odometry/scan_matcher.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <revisit/registration/icp.hpp>
+#include <revisit/registration/surface_cloud.hpp>
+
+namespace revisit {
+namespace {
+
+// Chosen on simulated drives and KITTI raw 0005 (docs/slam.md, docs/history.md).
+struct Matching {
+  static constexpr double kPointsAlongAVoxel = 2.0;  ///< that the map is given
+  static constexpr double kVoxelsToTheMedian = 12.0, kSmallestVoxel_m = 0.25, kLargestVoxel_m = 1.0;
+  static constexpr double kMapReach_m = 100.0;
+  static constexpr float kForgetEvery_m = 5.f;  ///< what lies beyond the reach
+  static constexpr double kNewShare = 0.1;      ///< of the newest scan in a running mean
+
+  static constexpr int kScansToLearn = 10;     ///< before the search radius follows the prediction error
+  static constexpr double kFarSearch_m = 2.0;  ///< until then, and where the prediction failed
+  static constexpr double kSigmas = 3.0;       ///< of the prediction error that are searched
+  static constexpr double kSettled_m = 2e-3;
+  static constexpr double kLeastSeen = 1e-3;  ///< a point in a thousand that faces a direction (IcpOptions)
+  static constexpr double kSteady_m = 0.02;   ///< rocking between two voxels counts as converged
+  static constexpr double kFineVoxels = 0.3, kFine_m = 0.1;  ///< narrowest kernel: so many voxels and so much more
+  static constexpr double kTurnsTried_deg[] = {0.0, 5.0, -5.0, 10.0, -10.0};  ///< where the prediction failed
+
+  static constexpr double kFewestMatched = 0.3;  ///< share of the points of a scan that is tracked
+  static constexpr double kBelowTypical = 0.2;   ///< what it may fall below the running mean
+  // The first scans of a sparse sensor meet few surfaces; those that they meet must fit.
+  static constexpr int kFirstScans = 5;
+  static constexpr double kFewestMatchedAtFirst = 0.1, kFittingAtFirst = 0.6;
+
+  static constexpr double kLongestGap_s = 1.0;  ///< beyond, the motion before says nothing about the motion now
+  static constexpr double kLongestExtrapolation_s = 5.0;  ///< and is still a better guess than none
+};
+
+double median_range_m(std::span<const Point> points) {
+  std::vector<float> ranges;
+  ranges.reserve(points.size());
+  for (const Point& p : points) ranges.push_back(std::hypot(p.x, p.y, p.z));
+  if (ranges.empty()) return 10.0;
+  const auto middle = ranges.begin() + static_cast<std::ptrdiff_t>(ranges.size() / 2);
+  std::nth_element(ranges.begin(), middle, ranges.end());
+  return static_cast<double>(*middle);
+}
+
+std::vector<Eigen::Vector3f> in_map(const std::vector<Eigen::Vector3f>& points, const Pose& T_odom_lidar) {
+  std::vector<Eigen::Vector3f> moved(points.size());
+  const Eigen::Isometry3f T = T_odom_lidar.cast<float>();
+  std::transform(points.begin(), points.end(), moved.begin(), [&](const Eigen::Vector3f& p) { return T * p; });
+  return moved;
+}
+
+}  // namespace
+
+std::optional<Twist> ScanMatcher::predicted_motion(double stamp_s) const {
+  const double gap_s = stamp_s - last_stamp_s_;
+  return gap_s > 0.0 && gap_s <= Matching::kLongestGap_s ? motion_ : std::nullopt;
+}
+
+MatcherScan ScanMatcher::thinned(std::span<const Point> points) const {
+  MatcherScan scan;
+  scan.range_m = map_ ? range_m_ : median_range_m(points);
+  scan.voxel_m = map_ ? map_->voxel_m()
+                      : std::clamp(scan.range_m / Matching::kVoxelsToTheMedian, Matching::kSmallestVoxel_m,
+                                   Matching::kLargestVoxel_m);
+  scan.map_points = thin_surfaces(points, {}, scan.voxel_m / Matching::kPointsAlongAVoxel).points;
+  std::vector<Point> thinned_once;
+  thinned_once.reserve(scan.map_points.size());
+  for (const Eigen::Vector3f& p : scan.map_points) thinned_once.push_back({p.x(), p.y(), p.z(), 0.f});
+  scan.points = thin_surfaces(thinned_once, {}, scan.voxel_m).points;
+  return scan;
+}
+
+double ScanMatcher::search_radius_m() const {
+  if (scans_ < Matching::kScansToLearn) return Matching::kFarSearch_m;
+  return std::clamp(Matching::kSigmas * std::sqrt(squared_prediction_error_m2_), map_->voxel_m(),
+                    Matching::kFarSearch_m);
+}
+
+bool ScanMatcher::is_credible(double matched, double met) const {
+  if (scans_ < Matching::kFirstScans)
+    return matched >= Matching::kFewestMatchedAtFirst && matched >= Matching::kFittingAtFirst * met;
+  return matched >= std::max(Matching::kFewestMatched, typical_match_ - Matching::kBelowTypical);
+}
+
+ScanMatch ScanMatcher::match(double stamp_s, const MatcherScan& scan,
+                             const std::optional<Pose>& T_previous_lidar) const {
+  ScanMatch match;
+  const double gap_s = stamp_s - last_stamp_s_;
+  const bool extrapolates = motion_ && gap_s > 0.0 && gap_s <= Matching::kLongestExtrapolation_s;
+  const Pose T_predicted = T_previous_lidar ? *T_previous_lidar
+                           : extrapolates   ? motion_after(*motion_, gap_s)
+                                            : Pose::Identity();
+  match.T_previous_lidar = match.T_previous_found = T_predicted;
+  match.T_odom_lidar = normalised(T_odom_lidar_ * T_predicted);
+  if (!map_) {
+    match.is_tracked = true;  // the map begins wherever it is
+    return match;
+  }
+  const double voxel_m = map_->voxel_m();
+  const auto align = [&](double radius_m, const Pose& T_guess) {
+    IcpResult icp = align_icp(*map_, scan.points, T_odom_lidar_ * T_guess,
+                              {.coarse_m = radius_m,
+                               .fine_m = std::min(radius_m, Matching::kFineVoxels * voxel_m + Matching::kFine_m),
+                               .least_reach_m = voxel_m,
+                               .settled_m = Matching::kSettled_m,
+                               .least_seen = Matching::kLeastSeen});
+    icp.converged = icp.converged || (icp.information(0, 0) > 0.0 && icp.last_step_m < Matching::kSteady_m);
+    return icp;
+  };
+  const auto fits = [&](const IcpResult& icp) { return icp.converged && is_credible(icp.matched, icp.met); };
+  IcpResult icp = align(search_radius_m(), T_predicted);
+  // A turn or a jolt that was not predicted, or the end of one. After a gap anything may fit somehow: nothing is tried.
+  const bool follows = gap_s > 0.0 && gap_s <= Matching::kLongestGap_s;
+  for (const double turn_deg : Matching::kTurnsTried_deg)
+    for (const Pose& T_guess : {T_predicted, Pose(Pose::Identity())}) {
+      if (fits(icp) || (turn_deg != 0.0 && !follows)) break;
+      const IcpResult other = align(Matching::kFarSearch_m, T_guess * planar_pose(0.0, 0.0, to_radians(turn_deg)));
+      if (fits(other) || other.matched > icp.matched) icp = other;
+    }
+  match.matched = icp.matched;
+  match.met = icp.met;
+  match.is_tracked = fits(icp);
+  match.T_previous_found = T_odom_lidar_.inverse() * icp.T_target_source;
+  const Pose error = T_predicted.inverse() * match.T_previous_found;
+  match.prediction_error_m = error.translation().norm() + rotation_angle(error) * range_m_;
+  if (match.is_tracked) {
+    match.T_odom_lidar = normalised(icp.T_target_source);
+    match.T_previous_lidar = match.T_previous_found;
+    match.information = icp.information;
+  }
+  return match;
+}
+
+void ScanMatcher::accept(double stamp_s, const MatcherScan& scan, const ScanMatch& match) {
+  const double gap_s = stamp_s - last_stamp_s_;
+  if (!map_) {
+    range_m_ = scan.range_m;
+    map_.emplace(scan.voxel_m, Matching::kMapReach_m);
+  } else {
+    const double share = std::max(Matching::kNewShare, 1.0 / scans_);
+    if (match.is_tracked) {
+      squared_prediction_error_m2_ +=
+          share * (match.prediction_error_m * match.prediction_error_m - squared_prediction_error_m2_);
+      typical_match_ += share * (match.matched - typical_match_);
+    }
+    motion_.reset();
+    if (gap_s > 0.0 && gap_s <= Matching::kLongestGap_s) motion_ = twist_of(match.T_previous_lidar, gap_s);
+  }
+  T_odom_lidar_ = match.T_odom_lidar;
+  if (match.is_tracked) map_->add(in_map(scan.map_points, T_odom_lidar_));
+  if (const Eigen::Vector3f here = T_odom_lidar_.translation().cast<float>();
+      (here - forgotten_from_).norm() > Matching::kForgetEvery_m) {
+    map_->forget_far_from(here);
+    forgotten_from_ = here;
+  }
+  last_stamp_s_ = stamp_s;
+  ++scans_;
+}
+
+void ScanMatcher::restart() {
+  map_.reset();
+  motion_.reset();
+  squared_prediction_error_m2_ = typical_match_ = 0.0;
+  scans_ = 0;
+}
+
+void ScanMatcher::restore(double stamp_s, const Pose& T_odom_lidar, const std::optional<Twist>& motion) {
+  last_stamp_s_ = stamp_s;
+  T_odom_lidar_ = T_odom_lidar;
+  motion_ = motion;
+  // How well scans typically match is to be learnt again.
+  squared_prediction_error_m2_ = typical_match_ = 0.0;
+  scans_ = 1;
+}
+
+}  // namespace revisit

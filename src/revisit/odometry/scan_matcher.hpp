@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <revisit/core/pose.hpp>
+#include <revisit/core/scan.hpp>
+#include <revisit/core/twist.hpp>
+#include <revisit/odometry/local_map.hpp>
+
+namespace revisit {
+
+/// A scan thinned for matching, in its own frame.
+struct MatcherScan {
+  std::vector<Eigen::Vector3f> points;      ///< one a voxel of the map: what is matched
+  std::vector<Eigen::Vector3f> map_points;  ///< eight a voxel at most: what enters the map
+  double voxel_m = 1.0, range_m = 10.0;     ///< edge of a voxel; the median range
+};
+
+/// Where one scan was matched.
+struct ScanMatch {
+  Pose T_odom_lidar = Pose::Identity();      ///< at the scan's stamp; the first scan is the origin
+  Pose T_previous_lidar = Pose::Identity();  ///< motion since the scan before
+  Pose T_previous_found = Pose::Identity();  ///< the same as registration has it, believed or not
+  Matrix6 information = Matrix6::Zero();     ///< of T_previous_lidar, as in LoopConstraint
+  double matched = 0.0;                      ///< share of the scan's points that lie on a surface of the map
+  double met = 0.0;                          ///< share with a surface of the map nearby at all
+  double prediction_error_m = 0.0;           ///< of a point at the median range
+  bool is_tracked = false;                   ///< otherwise the pose is the predicted one
+};
+
+/// Finds scans in the map of what was seen lately: the registration inside `Odometry`. Nothing to tune: the map's
+/// voxels follow from how far the first scan sees, the search radius from how well the motion is predicted. Scans come
+/// in the order of their stamps. Belongs to one thread at a time; deterministic, whatever the number of threads.
+class ScanMatcher {
+ public:
+  /// The predicted motion during the coming scan, where it follows closely on the last.
+  std::optional<Twist> predicted_motion(double stamp_s) const;
+
+  /// Thins a scan (filtered by range, its sweep compensated).
+  MatcherScan thinned(std::span<const Point> points) const;
+  /// Matches the scan with the map. `T_previous_lidar`, if there is one, is the motion since the scan before as wheels
+  /// or another odometry measured it: the guess, and the answer where the map gives none.
+  ScanMatch match(double stamp_s, const MatcherScan& scan, const std::optional<Pose>& T_previous_lidar = {}) const;
+  /// Goes on from there: the scan enters the map.
+  void accept(double stamp_s, const MatcherScan& scan, const ScanMatch& match);
+
+  /// Forgets what was seen: the next scan begins a map where it is predicted to be.
+  void restart();
+  /// Goes on from this pose, with the motion since the scan before, if it is known.
+  void restore(double stamp_s, const Pose& T_odom_lidar, const std::optional<Twist>& motion);
+
+  const LocalMap* map() const { return map_ ? &*map_ : nullptr; }
+
+ private:
+  double search_radius_m() const;
+  bool is_credible(double matched, double met) const;
+
+  std::optional<LocalMap> map_;
+  Pose T_odom_lidar_ = Pose::Identity();
+  std::optional<Twist> motion_;
+  Eigen::Vector3f forgotten_from_ = Eigen::Vector3f::Zero();  ///< where the map was last cut to its reach
+  double last_stamp_s_ = 0.0, range_m_ = 0.0;
+  double squared_prediction_error_m2_ = 0.0;  ///< running mean
+  double typical_match_ = 0.0;                ///< running mean of the share that met the map
+  int scans_ = 0;                             ///< in the map
+};
+
+}  // namespace revisit

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/odometry/scan_matcher.hpp>
+
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "synthetic_world.hpp"
+
+namespace revisit {
+namespace {
+
+using testing_support::SyntheticWorld;
+
+// Along a bend, 0.6 m a scan.
+Pose pose_of(int i) {
+  const double s = 0.6 * i, heading = 0.02 * i;
+  return SyntheticWorld::at(s, 0.2 * s * s / 20.0, heading);
+}
+
+std::vector<Point> seen_from(unsigned world, const Pose& T_world_lidar, unsigned noise) {
+  static const SyntheticWorld here(31), elsewhere(77);
+  return (world == 31 ? here : elsewhere).scan(T_world_lidar, {32, 600, -24.8, 5.0}, noise).points;
+}
+
+ScanMatch track(ScanMatcher& matcher, double stamp_s, std::span<const Point> points,
+                const std::optional<Pose>& T_previous_lidar = {}) {
+  const MatcherScan scan = matcher.thinned(points);
+  const ScanMatch match = matcher.match(stamp_s, scan, T_previous_lidar);
+  matcher.accept(stamp_s, scan, match);
+  return match;
+}
+
+TEST(ScanMatcher, FollowsABend) {
+  ScanMatcher matcher;
+  Pose T_found = Pose::Identity();
+  for (int i = 0; i < 30; ++i) {
+    const ScanMatch step = track(matcher, 0.1 * i, seen_from(31, pose_of(i), static_cast<unsigned>(i)));
+    EXPECT_TRUE(step.is_tracked) << "scan " << i << ", matched " << step.matched;
+    T_found = step.T_odom_lidar;
+  }
+  const Pose error = (pose_of(0).inverse() * pose_of(29)).inverse() * T_found;
+  EXPECT_LT(error.translation().norm(), 0.01 * 0.6 * 29) << "1 % of the travelled distance";
+  EXPECT_LT(to_degrees(rotation_angle(error)), 0.5);
+}
+
+// Turns and translations about an origin far away are nearly the same: they must not be solved for there.
+TEST(ScanMatcher, FollowsAsWellFarFromTheOrigin) {
+  ScanMatcher matcher;
+  Pose T_far = planar_pose(4000.0, -3000.0, 2.0);
+  matcher.restore(-0.1, T_far, std::nullopt);
+  Pose T_found = T_far;
+  for (int i = 0; i < 15; ++i) {
+    const Pose T_wheels = i == 0 ? Pose(Pose::Identity())
+                                 : pose_of(i - 1).inverse() * pose_of(i) * planar_pose(0.1, 0.0, to_radians(2.0));
+    T_found = track(matcher, 0.1 * i, seen_from(31, pose_of(i), static_cast<unsigned>(i)), T_wheels).T_odom_lidar;
+  }
+  const Pose error = (pose_of(0).inverse() * pose_of(14)).inverse() * (T_far.inverse() * T_found);
+  EXPECT_LT(error.translation().norm(), 0.01 * 0.6 * 14);
+  EXPECT_LT(to_degrees(rotation_angle(error)), 0.5);
+}
+
+TEST(ScanMatcher, SaysWhenItDoesNotMatchAndKeepsTheMotionOfTheWheels) {
+  ScanMatcher matcher;
+  for (int i = 0; i < 12; ++i) track(matcher, 0.1 * i, seen_from(31, pose_of(i), static_cast<unsigned>(i)));
+  // Somewhere else all at once, and then nothing to be seen at all.
+  const Pose T_wheels = planar_pose(0.6, 0.0, 0.02);
+  const double typical = matcher.match(1.2, matcher.thinned(seen_from(31, pose_of(12), 12))).matched;
+  const ScanMatch lost = track(matcher, 1.2, seen_from(77, SyntheticWorld::at(40, 30, 2.0), 1), T_wheels);
+  const ScanMatch blind = track(matcher, 1.3, {}, T_wheels);
+  for (const ScanMatch& step : {lost, blind}) {
+    EXPECT_FALSE(step.is_tracked) << step.matched << " of " << typical;
+    EXPECT_TRUE(step.T_previous_lidar.isApprox(T_wheels));
+  }
+}
+
+// A bare corridor without an end: every scan looks like the one before, wherever the robot is.
+std::vector<Point> corridor(unsigned noise) {
+  std::mt19937 random(noise);
+  std::normal_distribution<float> off(0.f, 0.01f);
+  std::vector<Point> points;
+  for (float x = -30.f; x < 30.f; x += 0.1f) {
+    for (float z = -1.f; z < 2.f; z += 0.2f)
+      for (const float y : {-2.f, 2.f}) points.push_back({x, y + off(random), z, 0.f});
+    for (float y = -2.f; y < 2.f; y += 0.2f) points.push_back({x, y, -1.f + off(random), 0.f});
+  }
+  return points;
+}
+
+TEST(ScanMatcher, WhatScansDoNotFixIsTakenFromWheels) {
+  ScanMatcher matcher;
+  const Pose T_wheels = planar_pose(0.5, 0.0, 0.0);
+  Pose T_found = Pose::Identity();
+  for (int i = 0; i < 40; ++i) {
+    const ScanMatch step = track(matcher, 0.1 * i, corridor(static_cast<unsigned>(i)),
+                                 i == 0 ? std::nullopt : std::optional<Pose>(T_wheels));
+    EXPECT_TRUE(step.is_tracked);
+    T_found = step.T_odom_lidar;
+  }
+  EXPECT_NEAR(T_found.translation().x(), 19.5, 0.4) << "2 % of the travelled distance";
+  EXPECT_LT(std::abs(T_found.translation().y()), 0.1);
+}
+
+TEST(ScanMatcher, AStandingStartAndTimesThatStandStill) {
+  ScanMatcher matcher;
+  for (const double stamp_s : {5.0, 5.0, 4.0, 4.5}) {
+    const ScanMatch step = track(matcher, stamp_s, seen_from(31, pose_of(0), 3));
+    EXPECT_TRUE(step.is_tracked);
+    EXPECT_LT(step.T_odom_lidar.translation().norm(), 0.01);
+  }
+  EXPECT_FALSE(matcher.predicted_motion(4.5)) << "no time has passed";
+  EXPECT_FALSE(matcher.predicted_motion(60.0)) << "too long a gap to predict anything";
+  EXPECT_TRUE(matcher.predicted_motion(4.6));
+}
+
+}  // namespace
+}  // namespace revisit

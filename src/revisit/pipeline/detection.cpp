@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/pipeline/detection.hpp>
+
+#include <revisit/core/refusal_text.hpp>
+#include <revisit/core/text.hpp>
+
+namespace revisit {
+
+std::string Detection::reason() const {
+  if (!refusal) return {};
+  std::string text = to_text(*refusal);
+  if (refusal->reason == Refusal::Reason::kImprobable && geometric) {
+    const LoopEvidence& e = geometric->evidence;
+    text += format(" (inliers %.2f; free space %.2f; intensity %.2f; rmse %.2f m)", e.inlier_ratio,
+                   e.free_space_agreement, e.intensity_agreement.value_or(0.0), e.rmse_m);
+  }
+  return text;
+}
+
+CandidateRow Detection::row() const {
+  CandidateRow row;
+  row.query = frame;
+  if (answer) row.match = answer->match;
+  row.score = score;
+  row.accepted = loop.has_value();
+  row.reason = reason();
+  return row;
+}
+
+}  // namespace revisit

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/pipeline/localiser.hpp>
+
+#include <fstream>
+
+#include <gtest/gtest.h>
+
+#include <revisit/pipeline/slam.hpp>
+
+#include "shared_data.hpp"
+#include "synthetic_world.hpp"
+
+namespace revisit {
+namespace {
+
+namespace fs = std::filesystem;
+using testing_support::fresh_folder;
+using testing_support::SyntheticWorld;
+
+const SyntheticWorld::Sensor kSensor{32, 600, -24.8, 5.0};
+const SyntheticWorld& town() {
+  static const SyntheticWorld world(61);
+  return world;
+}
+Pose pose_at(int i) { return SyntheticWorld::at(-20.0 + 0.8 * i, 0.0, 0.0); }
+
+// A map of 40 m, left on the disk.
+fs::path small_map() {
+  const fs::path folder = fresh_folder() / "map";
+  auto slam = Slam::open(folder);
+  EXPECT_TRUE(slam);
+  for (int i = 0; i < 50; ++i) {
+    Scan scan = town().scan(pose_at(i), kSensor, static_cast<unsigned>(i));
+    scan.frame = FrameId{i};
+    scan.stamp_s = 0.1 * i;
+    EXPECT_TRUE(slam->process(std::move(scan)));
+  }
+  EXPECT_TRUE(slam->finish());
+  return folder;
+}
+
+TEST(Localiser, OneScanAnswersFromTheMapOfAnEarlierRun) {
+  const fs::path map = small_map();
+  auto localiser = Localiser::open(map);
+  ASSERT_TRUE(localiser) << localiser.error().message;
+  EXPECT_GE(localiser->places(), 20u);
+  for (const double yaw_deg : {0.0, 178.0}) {
+    const Pose T_world_query = SyntheticWorld::at(3.3, 0.7, to_radians(yaw_deg));
+    const auto found = localiser->locate(town().scan(T_world_query, kSensor, 900));
+    ASSERT_TRUE(found) << found.error().message;
+    ASSERT_TRUE(found->T_map_lidar) << found->detection.reason();
+    const Pose error = (pose_at(0).inverse() * T_world_query).inverse() * *found->T_map_lidar;
+    EXPECT_LT(error.translation().norm(), 0.2);
+    EXPECT_LT(to_degrees(rotation_angle(error)), 0.5);
+    EXPECT_GT(found->probability, 0.95);
+  }
+  const auto elsewhere = localiser->locate(SyntheticWorld(77).scan(SyntheticWorld::at(0, 0, 0), kSensor));
+  ASSERT_TRUE(elsewhere);
+  EXPECT_FALSE(elsewhere->T_map_lidar);
+  EXPECT_FALSE(elsewhere->detection.reason().empty());
+}
+
+TEST(Localiser, SaysWhatIsWrongWithAMap) {
+  const auto nowhere = Localiser::open("/no/such/folder");
+  ASSERT_FALSE(nowhere);
+  EXPECT_NE(nowhere.error().message.find("/no/such/folder"), std::string::npos) << nowhere.error().message;
+  const fs::path folder = fresh_folder();
+  std::ofstream(folder / "map.sqlite") << "this is no map";
+  EXPECT_FALSE(Localiser::open(folder));
+  Parameters other_grid;
+  other_grid.descriptor.sectors = 60;
+  const auto refused = Localiser::open(small_map(), other_grid);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("on a grid of 20 x 30 x 4"), std::string::npos) << refused.error().message;
+}
+
+}  // namespace
+}  // namespace revisit

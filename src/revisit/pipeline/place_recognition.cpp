@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/pipeline/place_recognition.hpp>
+
+#include <algorithm>
+#include <numeric>
+
+#include <revisit/core/stopwatch.hpp>
+#include <revisit/verification/loop_verification.hpp>
+
+namespace revisit {
+
+Result<Detection> PlaceRecognition::find(const PreparedScan& query, std::size_t places,
+                                         const TypicalAgreement& typical) {
+  Detection detection;
+  detection.frame = query.scan.frame;
+  detection.searchable_places = places;
+  detection.points = query.scan.points.size();
+  detection.ground_points =
+      std::accumulate(query.ground.is_ground.begin(), query.ground.is_ground.end(), std::size_t{0});
+  detection.rings = query.ground.rings;
+  detection.preparation_ms = query.ms;
+
+  Stopwatch watch;
+  auto candidates = index_.search(query.descriptor, places);
+  if (!candidates) return candidates.error();
+  detection.candidates = *std::move(candidates);
+  detection.search_ms = watch.lap_ms();
+  if (detection.candidates.empty())
+    detection.refusal = Refusal{places == 0 ? Refusal::Reason::kNoSearchablePast : Refusal::Reason::kNoCandidate};
+  else if (const Status status = verify(query, typical, detection); !status)
+    return status.error();
+
+  recent_queries_.push_back({detection.frame, query.descriptor});
+  if (recent_queries_.size() > kTemporalPairs) recent_queries_.pop_front();
+  return detection;
+}
+
+Status PlaceRecognition::verify(const PreparedScan& query, const TypicalAgreement& typical, Detection& detection) {
+  Stopwatch watch;
+  const VerificationQuery question{query.scan.frame, query.descriptor, query.cloud, query.geometry,
+                                   query.trajectory_point};
+  const VerificationContext context{.parameters = parameters_,
+                                    .clouds = *clouds_,
+                                    .query_descriptor = [this](FrameId frame) -> std::optional<DescriptorView> {
+                                      const auto found =
+                                          std::find_if(recent_queries_.begin(), recent_queries_.end(),
+                                                       [&](const RecentQuery& each) { return each.frame == frame; });
+                                      if (found == recent_queries_.end()) return std::nullopt;
+                                      return found->descriptor;
+                                    },
+                                    .place_descriptor = [this](FrameId frame) { return index_.find(frame); },
+                                    .places = points_,
+                                    .following = following_,
+                                    .typical = typical,
+                                    .newest = index_.frame(detection.searchable_places - 1)};
+  LoopVerification verification(context, question);
+  auto answer = verification.verify(detection.candidates);
+  if (!answer) return answer.error();
+  for (const Hypothesis& each : verification.hypotheses())
+    if (each.geometric) detection.registered.push_back({each.candidate.match, *each.geometric});
+  if (*answer) accept(query, **answer, verification.registration().query_geometry(), detection);
+  detection.temporal_ms = verification.registration().temporal_ms();
+  detection.geometric_ms = watch.lap_ms();
+  return ok();
+}
+
+void PlaceRecognition::accept(const PreparedScan& query, Hypothesis& answer, const ScanGeometry& query_geometry,
+                              Detection& detection) {
+  detection.score = answer.score();
+  if (answer.is_accepted()) {
+    const auto& place = points_.at(answer.candidate.match);
+    // Its own evidence must speak for it: where nothing is to be seen, a robot is not followed for ever.
+    if (parameters_.geometric.follow && query.trajectory_point && place && answer.own_log_odds() > 0.0)
+      following_.add(*query.trajectory_point, answer.candidate.match, *place, answer.geometric->T_match_query,
+                     answer.geometric->log_odds);
+    refine(*answer.geometric, *answer.geometry, query_geometry);
+    const GeometricEvidence& found = *answer.geometric;
+    detection.loop =
+        LoopConstraint{detection.frame,       answer.candidate.match, found.T_match_query, found.evidence.inlier_ratio,
+                       found.evidence.rmse_m, found.probability,      detection.score,     found.information};
+  }
+  detection.answer = answer.candidate;
+  detection.temporal = answer.temporal;
+  detection.refusal = answer.refusal;
+  detection.geometric = answer.geometric;
+}
+
+Status PlaceRecognition::add(PreparedScan place) {
+  const FrameId frame = place.scan.frame;
+  if (const Status status = clouds_->put(frame, std::move(place.cloud)); !status) return status;
+  restore({frame, place.scan.stamp_s}, place.descriptor, place.trajectory_point);
+  return ok();
+}
+
+void PlaceRecognition::restore(const FrameTime& frame, const IntensityScanContext& descriptor,
+                               const std::optional<TrajectoryPoint>& point) {
+  index_.add(frame.frame, frame.stamp_s, descriptor);
+  points_[frame.frame] = point;
+}
+
+}  // namespace revisit

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <utility>
+
+#include <revisit/pipeline/detection.hpp>
+#include <revisit/retrieval/place_index.hpp>
+#include <revisit/verification/hypothesis.hpp>
+#include <revisit/verification/loop_following.hpp>
+#include <revisit/verification/place_clouds.hpp>
+
+namespace revisit {
+
+/// Retrieval and verification over the places seen so far: what LoopDetector, Slam and Localiser share. Frames
+/// increase. Belongs to one thread at a time.
+class PlaceRecognition {
+ public:
+  PlaceRecognition(const Parameters& parameters, std::unique_ptr<PlaceClouds> clouds)
+      : parameters_(parameters), index_(parameters.retrieval), clouds_(std::move(clouds)) {}
+
+  /// Looks for the scan among the first `places` of the index. An error where a place cannot be read.
+  Result<Detection> find(const PreparedScan& query, std::size_t places, const TypicalAgreement& typical);
+  /// Adds a place.
+  Status add(PreparedScan place);
+  /// A place whose cloud is kept already, of an earlier run.
+  void restore(const FrameTime& frame, const IntensityScanContext& descriptor,
+               const std::optional<TrajectoryPoint>& point);
+
+  const PlaceIndex& index() const { return index_; }
+
+ private:
+  Status verify(const PreparedScan& query, const TypicalAgreement& typical, Detection& detection);
+  void accept(const PreparedScan& query, Hypothesis& answer, const ScanGeometry& query_geometry, Detection& detection);
+
+  Parameters parameters_;
+  PlaceIndex index_;
+  std::unique_ptr<PlaceClouds> clouds_;
+  TrajectoryPoints points_;  ///< of all places
+  LoopFollowing following_;
+  struct RecentQuery {
+    FrameId frame;
+    IntensityScanContext descriptor;
+  };
+  std::deque<RecentQuery> recent_queries_;  ///< the last N, for temporal consistency
+};
+
+}  // namespace revisit

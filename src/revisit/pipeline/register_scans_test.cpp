@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/pipeline/register_scans.hpp>
+
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "synthetic_world.hpp"
+
+namespace revisit {
+namespace {
+
+using testing_support::SyntheticWorld;
+
+const SyntheticWorld::Sensor kDenseSensor{32, 900, -24.8, 5.0};
+
+TEST(RegisterScans, GivesThePoseWhateverTheHeading) {
+  const SyntheticWorld world(51);
+  const Pose T_target = SyntheticWorld::at(4, 0, 0.4);
+  for (const double heading_deg : {0.0, 100.0, 176.0, -60.0}) {
+    const Pose T_source = SyntheticWorld::at(6, 1, to_radians(heading_deg));
+    const auto found = register_scans(world.scan(T_source, kDenseSensor, 1), world.scan(T_target, kDenseSensor, 2));
+    ASSERT_TRUE(found) << found.error().message;
+    ASSERT_TRUE(found->is_accepted()) << heading_deg;
+    const Pose error = (T_target.inverse() * T_source).inverse() * found->T_target_source;
+    EXPECT_LT(error.translation().norm(), 0.1) << heading_deg;
+    EXPECT_LT(to_degrees(rotation_angle(error)), 0.3) << heading_deg;
+    EXPECT_GT(found->probability, 0.95);
+    EXPECT_GT(found->information(0, 0), 0.0);
+  }
+}
+
+TEST(RegisterScans, ScansOfTwoPlacesAreRefused) {
+  const auto found = register_scans(SyntheticWorld(51).scan(SyntheticWorld::at(0, 0, 0), kDenseSensor),
+                                    SyntheticWorld(52).scan(SyntheticWorld::at(0, 0, 0), kDenseSensor));
+  ASSERT_TRUE(found);
+  EXPECT_FALSE(found->is_accepted());
+}
+
+// NaN, (0,0,0) and intensities in the thousands: what a driver delivers.
+TEST(RegisterScans, TakesWhatADriverDelivers) {
+  const SyntheticWorld world(51);
+  const auto as_delivered = [&](const Pose& T, unsigned seed) {
+    Scan scan = world.scan(T, kDenseSensor, seed);
+    for (Point& p : scan.points) p.intensity *= 4000.f;
+    const float nan = std::numeric_limits<float>::quiet_NaN(), infinite = std::numeric_limits<float>::infinity();
+    for (int i = 0; i < 500; ++i) {
+      scan.points.push_back({0.f, 0.f, 0.f, 0.f});
+      scan.points.push_back({nan, nan, nan, nan});
+      scan.points.push_back({infinite, 0.f, 0.f, 5.f});
+      scan.points.push_back({20.f, 3.f, 1.f, nan});
+    }
+    return scan;
+  };
+  const Pose T_target = SyntheticWorld::at(4, 0, 0), T_source = SyntheticWorld::at(5, 1, 1.0);
+  const auto found = register_scans(as_delivered(T_source, 1), as_delivered(T_target, 2));
+  ASSERT_TRUE(found) << found.error().message;
+  ASSERT_TRUE(found->is_accepted());
+  const Pose error = (T_target.inverse() * T_source).inverse() * found->T_target_source;
+  EXPECT_LT(error.translation().norm(), 0.1);
+}
+
+TEST(RegisterScans, AnEmptyScanIsAnErrorThatSaysWhy) {
+  const Scan scan = SyntheticWorld(51).scan(SyntheticWorld::at(0, 0, 0), kDenseSensor);
+  for (const auto& found : {register_scans(Scan{}, scan), register_scans(scan, Scan{})}) {
+    ASSERT_FALSE(found);
+    EXPECT_NE(found.error().message.find("are needed to describe a place"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace revisit

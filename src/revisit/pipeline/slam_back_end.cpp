@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/pipeline/slam_back_end.hpp>
+
+#include <string>
+#include <utility>
+
+#include <revisit/core/stopwatch.hpp>
+#include <revisit/pose_graph/edge_information.hpp>
+#include <revisit/store/keyframe_bytes.hpp>
+#include <revisit/store/stored_clouds.hpp>
+
+namespace revisit {
+namespace {
+
+// A key frame so near to a place that it was recognised as adds a node to the graph, but no place and no cloud: memory
+// stays as it is on known ground.
+constexpr double kKnownPlace_m = 1.0, kKnownPlace_deg = 20.0;
+
+bool is_near(const Pose& T) {
+  return T.translation().norm() < kKnownPlace_m && rotation_angle(T) < to_radians(kKnownPlace_deg);
+}
+
+std::string text_of(FrameId frame) { return "frame " + std::to_string(frame.value); }
+
+}  // namespace
+
+SlamBackEnd::SlamBackEnd(const Parameters& parameters, Odometry::Source source, std::shared_ptr<MapStore> store,
+                         LogSink log)
+    : parameters_(parameters),
+      source_(source),
+      store_(std::move(store)),
+      log_(std::move(log)),
+      recognition_(parameters, clouds_in_store(store_)) {}
+
+Result<SlamBackEnd::Added> SlamBackEnd::add_keyframe(PreparedScan scan, const OdometryStep& odometry,
+                                                     bool starts_segment, const SensorFacts& sensor) {
+  Stopwatch watch;
+  Added added;
+  const FrameId frame = scan.scan.frame;
+  const bool is_first = graph_.keyframes().empty();
+  const TrajectoryPoint point = is_first || starts_segment ? TrajectoryPoint{.segment = odometry.segment,
+                                                                             .T_segment_lidar = odometry.T_odom_lidar}
+                                                           : graph_.last_point().to(odometry.T_odom_lidar);
+  scan.trajectory_point = point;
+  auto detection = find_loop(scan, starts_segment, sensor);
+  added.detect_ms = watch.lap_ms();
+
+  std::optional<StoredEdge> edge;
+  if (is_first) {
+    graph_.add_keyframe(frame, point, std::nullopt);
+  } else {
+    const KeyframeGraph::OdometryEdge from_last = edge_to(point, odometry.information);
+    edge = StoredEdge{graph_.keyframes().back(), frame, from_last.T_last_new, from_last.information, {}};
+    graph_.add_keyframe(frame, point, from_last);
+  }
+  std::vector<LoopGate::Decision> decisions;
+  bool is_known_place = false;
+  if (detection && detection->loop) {
+    decisions = graph_.offer(*detection->loop);
+    is_known_place = !decisions.empty() && is_near(detection->loop->T_match_query);
+  }
+  for (LoopGate::Decision& decision : graph_.decide_overdue()) decisions.push_back(std::move(decision));
+  added.graph_ms = watch.lap_ms();
+
+  Status stored = store_->add(stored_form(scan, starts_segment, is_known_place));
+  if (stored && edge) stored = store_->add(*edge);
+  if (stored && detection && detection->searchable_places > 0) stored = store_->add(detection->row());
+  if (stored) stored = write_sensor_facts(*store_, sensor);
+  if (stored) stored = enter(decisions, added.loops_entered);
+  if (stored && !is_known_place) stored = recognition_.add(std::move(scan));
+  if (!stored) return stored.error();
+  added.store_ms = watch.lap_ms();
+
+  if (const Status settled = graph_.settle_if_due(); !settled)
+    log_to(log_, LogLevel::kWarning, settled.error().message);
+  if (detection) added.detection = *std::move(detection);
+  added.graph_ms += watch.lap_ms();
+  return added;
+}
+
+// A segment that is not attached yet is looked for in everything that was mapped before it, however recent.
+Result<Detection> SlamBackEnd::find_loop(const PreparedScan& keyframe, bool starts_segment, const SensorFacts& sensor) {
+  const auto last_attached = starts_segment ? std::optional(graph_.keyframes().back()) : graph_.last_attached();
+  const PlaceIndex& index = recognition_.index();
+  const FrameTime frame{keyframe.scan.frame, keyframe.scan.stamp_s};
+  const std::size_t places = last_attached ? index.until(*last_attached) : index.searchable(frame);
+  auto detection = recognition_.find(keyframe, places, sensor.typical);
+  // A place that cannot be read gives no loop; the key frame is one all the same.
+  if (!detection)
+    log_to(log_, LogLevel::kWarning, text_of(frame.frame) + ": no loop is searched: " + detection.error().message);
+  return detection;
+}
+
+KeyframeGraph::OdometryEdge SlamBackEnd::edge_to(const TrajectoryPoint& point, const Matrix6& information) const {
+  const TrajectoryPoint& last = graph_.last_point();
+  const Pose T_last_new = T_between(last, point);
+  if (point.segment != last.segment) return {T_last_new, no_information()};
+  return {T_last_new, source_ == Odometry::Source::kExternal ? external_odometry_information(T_last_new)
+                                                             : odometry_information(T_last_new, information)};
+}
+
+StoredKeyframe SlamBackEnd::stored_form(const PreparedScan& keyframe, bool starts_segment, bool is_known_place) const {
+  StoredKeyframe stored;
+  stored.frame = keyframe.scan.frame;
+  stored.stamp_s = keyframe.scan.stamp_s;
+  stored.T_odom_lidar = keyframe.trajectory_point->T_segment_lidar;
+  stored.starts_segment = starts_segment;
+  if (is_known_place) return stored;
+  stored.descriptor = to_bytes(keyframe.descriptor);
+  stored.place = to_bytes(keyframe.cloud);
+  stored.cloud =
+      to_map_bytes(thin_surfaces(keyframe.scan.points, keyframe.ground.is_ground, parameters_.slam.map_voxel_m));
+  return stored;
+}
+
+Status SlamBackEnd::enter(const std::vector<LoopGate::Decision>& decisions, std::size_t& entered) {
+  for (const LoopGate::Decision& decision : decisions) {
+    LoopConstraint loop = decision.loop;
+    if (!decision.enters) {
+      log_to(log_, LogLevel::kInfo,
+             "the loop from " + text_of(loop.query) + " to " + std::to_string(loop.match.value) +
+                 " stays out of the graph: no other one agrees with it");
+      continue;
+    }
+    loop.information = loop_information(loop.information);
+    const bool attaches = graph_.add_loop(loop);
+    ++entered;
+    const StoredEdge edge{loop.match, loop.query, loop.T_match_query, loop.information, loop};
+    if (const Status status = store_->add(edge); !status) return status;
+    if (attaches)
+      log_to(log_, LogLevel::kInfo,
+             text_of(loop.query) + ": found again in the map, at frame " + std::to_string(loop.match.value));
+  }
+  return ok();
+}
+
+Status SlamBackEnd::finish() {
+  std::size_t entered = 0;
+  const Status stored = enter(graph_.decide_all(), entered);
+  const Status settled = graph_.settle(), committed = store_->commit();
+  for (const Status* each : {&stored, &settled})
+    if (!*each) return *each;
+  return committed;
+}
+
+Status SlamBackEnd::restore(const StoredSession& session) {
+  if (const Status status = restore_graph(session, graph_); !status) return status;
+  return restore_places(
+      *store_, session, parameters_.descriptor,
+      [this](const FrameTime& frame, const IntensityScanContext& descriptor,
+             const std::optional<TrajectoryPoint>& point) { recognition_.restore(frame, descriptor, point); });
+}
+
+}  // namespace revisit

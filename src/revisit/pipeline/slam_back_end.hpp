@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include <revisit/odometry/odometry.hpp>
+#include <revisit/pipeline/detection.hpp>
+#include <revisit/pipeline/place_recognition.hpp>
+#include <revisit/pose_graph/keyframe_graph.hpp>
+#include <revisit/store/stored_session.hpp>
+
+namespace revisit {
+
+/// The half of SLAM that sees key frames: looks for loops, keeps graph and store, and settles the graph.
+/// Belongs to one thread at a time.
+class SlamBackEnd {
+ public:
+  SlamBackEnd(const Parameters& parameters, Odometry::Source source, std::shared_ptr<MapStore> store, LogSink log);
+
+  struct Added {
+    std::optional<Detection> detection;  ///< absent where the places could not be searched
+    std::size_t loops_entered = 0;
+    double detect_ms = 0.0, graph_ms = 0.0, store_ms = 0.0;
+  };
+  /// `starts_segment`: how the key frame lies to the one before is not known. An error where the store failed: it and
+  /// the graph are then no longer the same.
+  Result<Added> add_keyframe(PreparedScan scan, const OdometryStep& odometry, bool starts_segment,
+                             const SensorFacts& sensor);
+  /// Decides about loops that wait for others, and settles the graph.
+  Status finish();
+  Status restore(const StoredSession& session);
+
+  const KeyframeGraph& graph() const { return graph_; }
+
+ private:
+  Result<Detection> find_loop(const PreparedScan& keyframe, bool starts_segment, const SensorFacts& sensor);
+  KeyframeGraph::OdometryEdge edge_to(const TrajectoryPoint& point, const Matrix6& information) const;
+  StoredKeyframe stored_form(const PreparedScan& keyframe, bool starts_segment, bool is_known_place) const;
+  Status enter(const std::vector<LoopGate::Decision>& decisions, std::size_t& entered);
+
+  Parameters parameters_;
+  Odometry::Source source_;
+  std::shared_ptr<MapStore> store_;
+  LogSink log_;
+  PlaceRecognition recognition_;
+  KeyframeGraph graph_;
+};
+
+}  // namespace revisit

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/pose_graph/keyframe_graph.hpp>
+
+#include <stdexcept>
+
+namespace revisit {
+namespace {
+
+constexpr std::size_t kSettleEvery_keyframes = 20;  // docs/slam.md, "Loops into the graph"
+
+}  // namespace
+
+void KeyframeGraph::add_keyframe(FrameId frame, const TrajectoryPoint& point, const std::optional<OdometryEdge>& edge) {
+  if (keyframes_.empty() == edge.has_value())
+    throw std::invalid_argument("the first key frame has no edge from the last one, and every other one has");
+  gate_.add_keyframe(frame, point);
+  const std::size_t node =
+      graph_.add_node(edge ? normalised(graph_.nodes().back() * edge->T_last_new) : Pose(Pose::Identity()));
+  if (edge) {
+    graph_.add_edge({node - 1, node, edge->T_last_new, edge->information});
+    if (point.segment != last_point_.segment) last_attached_ = keyframes_.back();
+  }
+  node_of_[frame] = node;
+  keyframes_.push_back(frame);
+  last_point_ = point;
+  ++keyframes_unsettled_;
+}
+
+bool KeyframeGraph::add_loop(const LoopConstraint& loop) {
+  graph_.add_edge({node_of_.at(loop.match), node_of_.at(loop.query), loop.T_match_query, loop.information, true});
+  ++loops_unsettled_;
+  const bool attaches = last_attached_ && loop.match <= *last_attached_ && *last_attached_ < loop.query;
+  if (attaches) last_attached_.reset();
+  return attaches;
+}
+
+void KeyframeGraph::restore_loop(const LoopConstraint& loop) {
+  add_loop(loop);
+  gate_.restore(loop);
+}
+
+Status KeyframeGraph::settle_if_due() {
+  return loops_unsettled_ == 0 || keyframes_unsettled_ < kSettleEvery_keyframes ? ok() : optimise(PoseGraph::kOnline);
+}
+
+Status KeyframeGraph::settle() { return loops_unsettled_ == 0 ? ok() : optimise(PoseGraph::kExactly); }
+
+Status KeyframeGraph::optimise(double settled) {
+  const auto report = graph_.optimise(settled);
+  if (!report) return report.error();
+  loops_unsettled_ = keyframes_unsettled_ = 0;
+  return ok();
+}
+
+}  // namespace revisit

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <optional>
+#include <vector>
+
+#include <revisit/core/loop.hpp>
+#include <revisit/core/trajectory_point.hpp>
+#include <revisit/pose_graph/loop_gate.hpp>
+#include <revisit/pose_graph/pose_graph.hpp>
+
+namespace revisit {
+
+/// The back end of SLAM: key frames joined by odometry and by the loops that the gate lets in, and where they stand in
+/// the world. Knows neither scans nor files. Belongs to one thread at a time.
+class KeyframeGraph {
+ public:
+  /// The motion since the last key frame.
+  struct OdometryEdge {
+    Pose T_last_new = Pose::Identity();
+    Matrix6 information = Matrix6::Identity();
+  };
+  /// The first key frame is the origin of the world; every later one has an edge. A point on another segment than the
+  /// last one's begins a segment that is not yet attached to the map.
+  void add_keyframe(FrameId frame, const TrajectoryPoint& point, const std::optional<OdometryEdge>& edge);
+
+  /// Hands a loop between two key frames, of which the query may be the newest of all, to the gate.
+  std::vector<LoopGate::Decision> offer(const LoopConstraint& loop) { return gate_.offer(loop); }
+  std::vector<LoopGate::Decision> decide_overdue() { return gate_.decide_overdue(); }
+  std::vector<LoopGate::Decision> decide_all() { return gate_.decide_all(); }
+  /// Adds a loop that the gate let in. True where it attaches the newest segment to the map.
+  bool add_loop(const LoopConstraint& loop);
+  /// A loop that entered in an earlier run.
+  void restore_loop(const LoopConstraint& loop);
+
+  /// Moves the key frames to where all edges agree best: at the latest after 20 key frames with loops among them.
+  Status settle_if_due();
+  /// The same at once, and to the last digit.
+  Status settle();
+
+  bool has(FrameId frame) const { return node_of_.contains(frame); }
+  const Pose& T_world_lidar(FrameId keyframe) const { return graph_.nodes()[node_of_.at(keyframe)]; }
+  const std::vector<FrameId>& keyframes() const { return keyframes_; }  ///< by node of the graph
+  const PoseGraph& graph() const { return graph_; }
+  const TrajectoryPoint& last_point() const { return last_point_; }
+  /// While the newest segment is not attached: the last key frame before it.
+  std::optional<FrameId> last_attached() const { return last_attached_; }
+
+ private:
+  Status optimise(double settled);
+
+  PoseGraph graph_;
+  LoopGate gate_;
+  std::vector<FrameId> keyframes_;
+  std::map<FrameId, std::size_t> node_of_;
+  TrajectoryPoint last_point_;
+  std::optional<FrameId> last_attached_;
+  std::size_t loops_unsettled_ = 0, keyframes_unsettled_ = 0;
+};
+
+}  // namespace revisit

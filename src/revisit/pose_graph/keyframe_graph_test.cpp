@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/pose_graph/keyframe_graph.hpp>
+
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+namespace revisit {
+namespace {
+
+constexpr int kKeyframes = 40;
+
+// Out along x for 20 m and back, as odometry that is 5 % too long sees it.
+struct OutAndBack {
+  OutAndBack() {
+    TrajectoryPoint point;
+    for (int i = 0; i < kKeyframes; ++i) {
+      if (i == 0) {
+        graph.add_keyframe({0}, point, std::nullopt);
+        continue;
+      }
+      const double scale = i < kKeyframes / 2 ? 1.05 : 1.0;
+      const Pose T = i == kKeyframes / 2 ? planar_pose(0, 0, kPi) : planar_pose(scale, 0, 0);
+      point = point.after(T);
+      graph.add_keyframe({i}, point, KeyframeGraph::OdometryEdge{T, 100.0 * Matrix6::Identity()});
+    }
+  }
+  // The way back passes the places of the way out, heading the other way.
+  static LoopConstraint loop(int query) {
+    LoopConstraint loop;
+    loop.query = {query};
+    loop.match = {kKeyframes - 1 - query};
+    loop.T_match_query = planar_pose(0, 0, kPi);
+    loop.probability = 0.99;
+    loop.information = 1e4 * Matrix6::Identity();
+    return loop;
+  }
+  KeyframeGraph graph;
+};
+
+TEST(KeyframeGraph, LoopsThatAgreeMoveTheKeyframes) {
+  OutAndBack drive;
+  const double before_m = drive.graph.T_world_lidar({kKeyframes - 1}).translation().norm();
+  EXPECT_NEAR(before_m, 0.95, 1e-9) << "19 m out, times 1.05, and 19 m back";
+  EXPECT_TRUE(drive.graph.offer(OutAndBack::loop(36)).empty()) << "alone it waits";
+  const auto decisions = drive.graph.offer(OutAndBack::loop(38));
+  ASSERT_EQ(decisions.size(), 2u);
+  for (const auto& decision : decisions) {
+    EXPECT_TRUE(decision.enters);
+    EXPECT_FALSE(drive.graph.add_loop(decision.loop)) << "there is one segment only";
+  }
+  ASSERT_TRUE(drive.graph.settle());
+  EXPECT_LT(drive.graph.T_world_lidar({38}).translation().norm(), 1.2);
+  const Pose circle = drive.graph.T_world_lidar({1}).inverse() * drive.graph.T_world_lidar({38});
+  EXPECT_LT(circle.translation().norm(), 0.05) << "the loop holds now";
+}
+
+TEST(KeyframeGraph, ASegmentIsAttachedByALoopIntoWhatWasBefore) {
+  OutAndBack drive;
+  EXPECT_FALSE(drive.graph.last_attached());
+  TrajectoryPoint elsewhere{.segment = 1};
+  const KeyframeGraph::OdometryEdge unknown{Pose::Identity(), 1e-4 * Matrix6::Identity()};
+  drive.graph.add_keyframe({100}, elsewhere, unknown);
+  ASSERT_TRUE(drive.graph.last_attached());
+  EXPECT_EQ(*drive.graph.last_attached(), FrameId{kKeyframes - 1});
+  drive.graph.add_keyframe({101}, elsewhere.after(planar_pose(1, 0, 0)),
+                           KeyframeGraph::OdometryEdge{planar_pose(1, 0, 0), Matrix6::Identity()});
+  LoopConstraint within = OutAndBack::loop(38);
+  within.query = {101};
+  within.match = {100};
+  EXPECT_FALSE(drive.graph.add_loop(within)) << "a loop within the segment says nothing about the rest";
+  within.match = {3};
+  EXPECT_TRUE(drive.graph.add_loop(within));
+  EXPECT_FALSE(drive.graph.last_attached());
+}
+
+TEST(KeyframeGraph, MisuseThrows) {
+  KeyframeGraph graph;
+  EXPECT_THROW(graph.add_keyframe({0}, {}, KeyframeGraph::OdometryEdge{}), std::invalid_argument);
+  graph.add_keyframe({5}, {}, std::nullopt);
+  EXPECT_THROW(graph.add_keyframe({6}, {}, std::nullopt), std::invalid_argument);
+  EXPECT_THROW(graph.add_keyframe({5}, {}, KeyframeGraph::OdometryEdge{}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace revisit

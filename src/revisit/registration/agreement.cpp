@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/registration/agreement.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include <oneapi/tbb/parallel_invoke.h>
+
+namespace revisit {
+namespace {
+
+struct Measures {
+  static constexpr float kSeenMargin_m = 1.f;       ///< what ranges within a cell of seen space may be off
+  static constexpr double kReach = 2.5;             ///< in-plane distance to the nearest centroid, in inlier distances
+  static constexpr double kVisibleShare = 0.95;     ///< of the points, the nearest: beyond, the other scan sees little
+  static constexpr std::size_t kFewestPoints = 50;  ///< of fewer, nothing can be said
+};
+
+// Pearson's correlation of pairs.
+struct Correlation {
+  double n = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0;
+  void add(double a, double b) { n += 1.0, x += a, y += b, xx += a * a, yy += b * b, xy += a * b; }
+  double spread_x() const { return n * xx - x * x; }
+  double spread_y() const { return n * yy - y * y; }
+  // Intensities that are all alike tell nothing.
+  bool is_known() const { return n > 0 && spread_x() > 1e-6 * n * n && spread_y() > 1e-6 * n * n; }
+  double value() const { return (n * xy - x * y) / std::sqrt(spread_x() * spread_y()); }
+};
+
+struct DirectionalAgreement {
+  Correlation intensities;
+  std::size_t visible = 0, inliers = 0, seen_through = 0;
+  double squared_sum = 0.0;
+};
+
+// The share of the points above ground of `from` that lie on a surface of `to`.
+DirectionalAgreement agreement_one_way(const SurfaceCloud& to, const SurfaceCloud& from, const Pose& T_to_from,
+                                       double inlier_distance_m, double farthest_m) {
+  DirectionalAgreement result;
+  const auto reach2 = static_cast<float>(std::pow(Measures::kReach * inlier_distance_m, 2));
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    if (from.is_ground(i)) continue;
+    const Eigen::Vector3d p = T_to_from * from.point(i).cast<double>();
+    if (p.norm() > farthest_m) continue;
+    ++result.visible;
+    const auto neighbour = to.nearest(p.cast<float>(), reach2);
+    double distance = std::numeric_limits<double>::infinity();
+    if (neighbour) {
+      const Eigen::Vector3d n = to.normal(neighbour->index).cast<double>();
+      const Eigen::Vector3d d = p - to.point(neighbour->index).cast<double>();
+      distance = n.squaredNorm() < 0.5 ? d.norm() : std::abs(n.dot(d));
+    }
+    if (distance <= inlier_distance_m) {
+      ++result.inliers;
+      result.intensities.add(static_cast<double>(from.intensity(i)),
+                             static_cast<double>(to.intensity(neighbour->index)));
+      result.squared_sum += distance * distance;
+    } else if (to.seen().look(p.cast<float>(), Measures::kSeenMargin_m) == SeenSpace::Verdict::kThrough) {
+      ++result.seen_through;
+    }
+  }
+  return result;
+}
+
+double range_that_holds_most(const SurfaceCloud& cloud) {
+  std::vector<float> ranges;
+  for (std::size_t i = 0; i < cloud.size(); ++i)
+    if (!cloud.is_ground(i)) ranges.push_back(cloud.point(i).norm());
+  if (ranges.empty()) return 0.0;
+  const auto rank =
+      ranges.begin() + static_cast<std::ptrdiff_t>(static_cast<double>(ranges.size() - 1) * Measures::kVisibleShare);
+  std::nth_element(ranges.begin(), rank, ranges.end());
+  return static_cast<double>(*rank);
+}
+
+}  // namespace
+
+Agreement measure_agreement(const SurfaceCloud& target, const SurfaceCloud& source, const Pose& T_target_source,
+                            double inlier_distance_m) {
+  const double target_range = range_that_holds_most(target), source_range = range_that_holds_most(source);
+  DirectionalAgreement forth, back;
+  tbb::parallel_invoke(
+      [&] { forth = agreement_one_way(target, source, T_target_source, inlier_distance_m, target_range); },
+      [&] { back = agreement_one_way(source, target, T_target_source.inverse(), inlier_distance_m, source_range); });
+  const auto ratio = [](const DirectionalAgreement& a) {
+    return a.visible < Measures::kFewestPoints ? 0.0 : static_cast<double>(a.inliers) / static_cast<double>(a.visible);
+  };
+  Agreement result;
+  result.inlier_ratio = std::min(ratio(forth), ratio(back));
+  const auto undisputed = [](const DirectionalAgreement& a) {
+    const std::size_t known = a.inliers + a.seen_through;
+    return known == 0 ? 0.0 : static_cast<double>(a.inliers) / static_cast<double>(known);
+  };
+  result.free_space_agreement = std::min(undisputed(forth), undisputed(back));
+  if (forth.intensities.is_known() && back.intensities.is_known())
+    result.intensity_correlation = std::min(forth.intensities.value(), back.intensities.value());
+  const std::size_t inliers = forth.inliers + back.inliers;
+  if (inliers > 0) result.rmse_m = std::sqrt((forth.squared_sum + back.squared_sum) / static_cast<double>(inliers));
+  return result;
+}
+
+}  // namespace revisit

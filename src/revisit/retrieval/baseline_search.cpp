@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/retrieval/baseline_search.hpp>
+
+#include <algorithm>
+#include <numeric>
+
+#include <oneapi/tbb/parallel_for.h>
+
+namespace revisit {
+
+std::vector<std::size_t> BaselineSearch::shortlist(const Place& query, std::size_t searchable) const {
+  std::vector<std::size_t> all(searchable);
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  const std::size_t wanted = method_->nearest_keys();
+  if (wanted == 0 || searchable <= wanted) return all;
+  std::vector<float> distance(searchable);
+  for (std::size_t i = 0; i < searchable; ++i) distance[i] = (places_[i].key - query.key).squaredNorm();
+  std::partial_sort(
+      all.begin(), all.begin() + static_cast<std::ptrdiff_t>(wanted), all.end(),
+      [&](std::size_t a, std::size_t b) { return distance[a] != distance[b] ? distance[a] < distance[b] : a < b; });
+  all.resize(wanted);
+  return all;
+}
+
+std::optional<CandidateRow> BaselineSearch::process(const FrameTime& query_frame, std::span<const Point> points,
+                                                    double ground_z_m) {
+  Place query;
+  query.frame = query_frame;
+  if (!places_.empty()) query.frame.stamp_s = std::max(query_frame.stamp_s, places_.back().frame.stamp_s);
+  query.signature = method_->describe(points, ground_z_m);
+  query.key = method_->key(query.signature);
+
+  const auto too_recent = std::partition_point(
+      places_.begin(), places_.end(), [&](const Place& place) { return exclusion_.allows(query_frame, place.frame); });
+  const auto searchable = static_cast<std::size_t>(too_recent - places_.begin());
+  std::optional<CandidateRow> row;
+  if (searchable > 0) {
+    const std::vector<std::size_t> compared = shortlist(query, searchable);
+    std::vector<double> similarity(compared.size());
+    tbb::parallel_for(std::size_t{0}, compared.size(), [&](std::size_t i) {
+      similarity[i] = method_->similarity(query.signature, places_[compared[i]].signature);
+    });
+    const auto best = std::max_element(similarity.begin(), similarity.end());
+    row.emplace();
+    row->query = query_frame.frame;
+    row->match = places_[compared[static_cast<std::size_t>(best - similarity.begin())]].frame.frame;
+    row->score = *best;
+    row->reason = "retrieval only: no pose to verify";
+  }
+  places_.push_back(std::move(query));
+  return row;
+}
+
+}  // namespace revisit

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <revisit/core/candidate_row.hpp>
+#include <revisit/core/exclusion.hpp>
+#include <revisit/core/scan.hpp>
+#include <revisit/descriptors/baseline.hpp>
+
+namespace revisit {
+
+/// Places by a published descriptor: answers each scan with the place most like it, however little that is, and adds
+/// the scan. Frames increase. Belongs to one thread at a time.
+class BaselineSearch {
+ public:
+  BaselineSearch(std::unique_ptr<Baseline> method, const ExclusionRule& exclusion)
+      : method_(std::move(method)), exclusion_(exclusion) {}
+
+  /// `points`: prepared, as Baseline::describe() takes them. None where no place is old enough. Every answer counts as
+  /// refused: there is no threshold.
+  std::optional<CandidateRow> process(const FrameTime& query, std::span<const Point> points, double ground_z_m);
+
+  const Baseline& method() const { return *method_; }
+
+ private:
+  struct Place {
+    FrameTime frame;  ///< with the latest stamp until here
+    Baseline::Signature signature;
+    Eigen::VectorXf key;
+  };
+  /// The places that are compared, out of the first `searchable`.
+  std::vector<std::size_t> shortlist(const Place& query, std::size_t searchable) const;
+
+  std::unique_ptr<Baseline> method_;
+  ExclusionRule exclusion_;
+  std::vector<Place> places_;
+};
+
+}  // namespace revisit

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+
+#include <revisit/store/map_store.hpp>
+#include <revisit/verification/place_clouds.hpp>
+
+namespace revisit {
+
+/// The clouds of a map's key frames, read when they are needed; the `kept` latest used stay in memory. A cloud that is
+/// put must be in the store already.
+std::unique_ptr<PlaceClouds> clouds_in_store(std::shared_ptr<const MapStore> store, std::size_t kept = 256);
+
+}  // namespace revisit

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/store/stored_clouds.hpp>
+
+#include <gtest/gtest.h>
+
+#include <revisit/store/keyframe_bytes.hpp>
+#include <revisit/store/sensor_facts.hpp>
+
+#include "synthetic_world.hpp"
+
+namespace revisit {
+namespace {
+
+using testing_support::SyntheticWorld;
+
+struct Stored {
+  explicit Stored(const std::string& name) {
+    file = std::filesystem::path(testing::TempDir()) / ("revisit_clouds_" + name + ".map");
+    for (const char* ending : {"", "-wal", "-shm"}) std::filesystem::remove(file.string() + ending);
+    store = std::make_shared<MapStore>(*MapStore::create(file));
+    for (int i = 0; i < 5; ++i) {
+      const Scan scan = SyntheticWorld(51).scan(SyntheticWorld::at(i, 0, 0), {16, 90, -15.0, 15.0});
+      clouds.push_back(thin(scan.points, {}, 1.0));
+      StoredKeyframe keyframe;
+      keyframe.frame = FrameId{i};
+      keyframe.place = to_bytes(clouds.back());
+      EXPECT_TRUE(store->add(keyframe));
+    }
+    EXPECT_TRUE(store->commit());
+  }
+  std::filesystem::path file;
+  std::shared_ptr<MapStore> store;
+  std::vector<ThinCloud> clouds;
+};
+
+TEST(StoredClouds, GivesEachPlaceItsOwnCloudHoweverFewStayInMemory) {
+  const Stored stored("few");
+  const auto clouds = clouds_in_store(stored.store, 2);
+  for (const int i : {0, 1, 2, 3, 4, 0, 4, 2, 2, 1}) {
+    const auto cloud = clouds->get({i});
+    ASSERT_TRUE(cloud) << cloud.error().message;
+    EXPECT_EQ((*cloud)->points, stored.clouds[static_cast<std::size_t>(i)].points) << "place " << i;
+  }
+}
+
+TEST(StoredClouds, ACloudGivenOutOutlivesItsPlaceInMemory) {
+  const Stored stored("outlives");
+  const auto clouds = clouds_in_store(stored.store, 1);
+  const auto first = clouds->get({0});
+  ASSERT_TRUE(clouds->get({1}) && clouds->get({2}));
+  EXPECT_EQ((*first)->points, stored.clouds[0].points);
+}
+
+TEST(StoredClouds, AnUnknownPlaceAndADamagedOneAreErrors) {
+  Stored stored("damaged");
+  const auto clouds = clouds_in_store(stored.store, 2);
+  EXPECT_FALSE(clouds->get({77}));
+  StoredKeyframe broken;
+  broken.frame = FrameId{9};
+  broken.place = Bytes(13);
+  ASSERT_TRUE(stored.store->add(broken));
+  const auto damaged = clouds->get({9});
+  ASSERT_FALSE(damaged);
+  EXPECT_NE(damaged.error().message.find("the place of key frame 9 is damaged"), std::string::npos);
+}
+
+TEST(SensorFacts, ComeBackAndDamagedOnesAreRefused) {
+  const Stored stored("facts");
+  EXPECT_FALSE(read_sensor_facts(*stored.store)->has_value()) << "none yet";
+  SensorFacts facts;
+  facts.intensity_scale.full_scale = 0.1;
+  facts.intensity_scale.is_reflectance = false;
+  facts.typical = {0.83, 0.61};
+  facts.typical_pairs = 40;
+  ASSERT_TRUE(write_sensor_facts(*stored.store, facts));
+  const auto back = read_sensor_facts(*stored.store);
+  ASSERT_TRUE(back && *back);
+  EXPECT_EQ((*back)->intensity_scale.full_scale, 0.1);
+  EXPECT_FALSE((*back)->intensity_scale.is_reflectance);
+  EXPECT_EQ((*back)->typical.intensity_correlation, 0.61);
+  EXPECT_EQ((*back)->typical_pairs, 40u);
+  for (const char* damaged : {"", "0 1 0.8 0.9 10", "1 1 1.8 0.9 10", "nan 1 0.8 0.9 10"}) {
+    ASSERT_TRUE(stored.store->set_note("sensor", damaged));
+    EXPECT_FALSE(read_sensor_facts(*stored.store)) << damaged;
+  }
+}
+
+}  // namespace
+}  // namespace revisit

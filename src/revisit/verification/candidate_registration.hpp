@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <revisit/config/parameters.hpp>
+#include <revisit/core/trajectory_point.hpp>
+#include <revisit/registration/overhead_search.hpp>
+#include <revisit/verification/hypothesis.hpp>
+#include <revisit/verification/loop_following.hpp>
+#include <revisit/verification/place_clouds.hpp>
+
+namespace revisit {
+
+/// A scan whose place is searched.
+struct VerificationQuery {
+  FrameId frame;
+  const IntensityScanContext& descriptor;
+  const ThinCloud& cloud;
+  std::shared_ptr<const ScanGeometry> geometry;  ///< of the cloud, where it was made already
+  std::optional<TrajectoryPoint> trajectory_point;
+};
+
+/// What is known of the places that may answer.
+struct VerificationContext {
+  const Parameters& parameters;
+  PlaceClouds& clouds;
+  DescriptorLookup query_descriptor, place_descriptor;  ///< of the queries before, and of the places
+  const TrajectoryPoints& places;
+  const LoopFollowing& following;
+  TypicalAgreement typical;
+  FrameId newest;  ///< place that may answer
+};
+
+/// How one hypothesis about a query is tested: seen from overhead, then temporal consistency, then registration
+/// (docs/method.md, section 7). Lives as long as the query and the context.
+class CandidateRegistration {
+ public:
+  CandidateRegistration(const VerificationContext& context, const VerificationQuery& query);
+
+  /// The candidates that fit best from overhead, at most `options.candidates`, registered where nothing refuses them
+  /// before. An error where the cloud of a place cannot be read.
+  Result<std::vector<Hypothesis>> test(std::span<const LoopCandidate> candidates);
+  /// A place that the query is predicted to stand near to: only the pose is open, and little overlap is no objection,
+  /// since something may stand in the way.
+  Result<Hypothesis> test(const PosePrediction& prediction);
+
+  const ScanGeometry& query_geometry();
+  /// The time spent on temporal consistency, which the paper counts apart.
+  double temporal_ms() const { return temporal_ms_; }
+
+  static constexpr int kReach_m = 6;  ///< how far retrieval may be off; the overhead search covers it
+
+ private:
+  Result<Hypothesis> open(const LoopCandidate& candidate) const;
+  void search_overhead(double yaw_reach_rad, Hypothesis& hypothesis);
+  void check_temporal_consistency(Hypothesis& hypothesis) const;
+  void register_scans(Hypothesis& hypothesis) const;
+  Pose from_upright(const Hypothesis& hypothesis, const Pose& T_match_query_upright) const;
+
+  const VerificationContext& context_;
+  const GeometricOptions& options_;
+  const VerificationQuery& query_;
+  OverheadSearch overhead_;
+  std::shared_ptr<const ScanGeometry> query_geometry_;
+  double temporal_ms_ = 0.0;
+};
+
+}  // namespace revisit

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+#include <map>
+#include <optional>
+
+#include <revisit/core/ids.hpp>
+#include <revisit/core/pose.hpp>
+#include <revisit/core/trajectory_point.hpp>
+
+namespace revisit {
+
+/// Points of the places by frame; a place whose odometry failed has none.
+using TrajectoryPoints = std::map<FrameId, std::optional<TrajectoryPoint>>;
+
+/// A pose of the query relative to a place that something other than retrieval gives.
+struct PosePrediction {
+  FrameId match;
+  Pose T_match_query = Pose::Identity();
+};
+
+/// Metres of motion between two points over which odometry can be relied on: travelled metres, and turns as the metres
+/// that bring as much error. Nothing where it is more than that, or where the segments differ.
+std::optional<double> reliable_motion_m(const TrajectoryPoint& a, const TrajectoryPoint& b);
+
+/// The place nearest to a query that stands at `T_match_query` from one of them, among those that odometry connects
+/// reliably with that one and that are no newer than `newest`.
+std::optional<PosePrediction> nearest_place(const TrajectoryPoints& places, FrameId match, const Pose& T_match_query,
+                                            FrameId newest);
+
+/// The prior along the trajectory: loops of the last metres, carried on by odometry. They predict where the query
+/// stands, and support a pose that agrees with them; a robot does not jump. Belongs to one thread at a time.
+class LoopFollowing {
+ public:
+  /// Remembers a loop with its log odds: those of its own evidence and of the loops before it that support it.
+  void add(const TrajectoryPoint& query, FrameId match, const TrajectoryPoint& place, const Pose& T_match_query,
+           double log_odds);
+  /// Where the surest loop of the last metres says that the query stands, relative to the nearest place that is no
+  /// newer than `newest`.
+  std::optional<PosePrediction> predict(const std::optional<TrajectoryPoint>& query, const TrajectoryPoints& places,
+                                        FrameId newest) const;
+  /// The log odds that loops of the last metres add to this pose; 0 where none of them agrees with it.
+  double support_log_odds(const std::optional<TrajectoryPoint>& query, const std::optional<TrajectoryPoint>& place,
+                          const Pose& T_match_query) const;
+
+ private:
+  struct Anchor {
+    TrajectoryPoint query, place;
+    FrameId match;
+    Pose T_place_query_segment = Pose::Identity();  ///< the query's segment in the frame of the place's
+    double log_odds = 0.0;
+    double log_odds_after(double motion_m) const;
+  };
+  std::deque<Anchor> anchors_;
+};
+
+}  // namespace revisit

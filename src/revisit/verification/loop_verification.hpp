@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <revisit/verification/candidate_registration.hpp>
+
+namespace revisit {
+
+/// Which of the candidates of one query is its place, if any: docs/method.md, section 7. Lives as long as the query and
+/// the context.
+class LoopVerification {
+ public:
+  LoopVerification(const VerificationContext& context, const VerificationQuery& query)
+      : context_(context), query_(query), registration_(context_, query_) {}
+
+  /// The best hypothesis, accepted or not; none where there are no candidates. An error where a place cannot be read.
+  Result<std::optional<Hypothesis>> verify(std::span<const LoopCandidate> candidates);
+  /// Everything that was tested.
+  const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
+  CandidateRegistration& registration() { return registration_; }
+
+ private:
+  Result<std::optional<Hypothesis>> test_predicted_place();
+  Status test_nearer_place(Hypothesis& answer);
+  bool is_sufficient(const Hypothesis& predicted) const;
+
+  const VerificationContext& context_;
+  const VerificationQuery& query_;
+  CandidateRegistration registration_;
+  std::vector<Hypothesis> hypotheses_;
+};
+
+}  // namespace revisit

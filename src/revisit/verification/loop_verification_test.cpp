@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/verification/loop_verification.hpp>
+
+#include <gtest/gtest.h>
+
+#include <revisit/descriptors/similarity.hpp>
+
+#include "synthetic_world.hpp"
+
+namespace revisit {
+namespace {
+
+using testing_support::SyntheticWorld;
+
+struct Described {
+  IntensityScanContext descriptor;
+  ThinCloud cloud;
+};
+
+Described described(const SyntheticWorld& world, const Pose& T_world_lidar) {
+  const Scan scan = world.scan(T_world_lidar, {32, 900, -24.8, 5.0});
+  std::vector<std::uint8_t> ground;
+  for (const Point& p : scan.points) ground.push_back(p.z < -1.6f);
+  return {describe(scan.points, {}), thin(scan.points, ground, LearntWith::kVoxel_m)};
+}
+
+// Places along x, a metre apart, frame by frame, and one of another world as frame 90.
+class LoopVerificationTest : public testing::Test {
+ protected:
+  LoopVerificationTest() {
+    TrajectoryPoint point;
+    for (int i = 0; i < 6; ++i) {
+      add(i, described(home_, SyntheticWorld::at(i, 0, 0)), point);
+      point = point.after(planar_pose(1, 0, 0));
+    }
+    add(90, described(SyntheticWorld(52), SyntheticWorld::at(0, 0, 0)), std::nullopt);
+  }
+  void add(int frame, Described place, const std::optional<TrajectoryPoint>& point) {
+    descriptors_[FrameId{frame}] = place.descriptor;
+    ASSERT_TRUE(clouds_->put(FrameId{frame}, std::move(place.cloud)));
+    points_[FrameId{frame}] = point;
+  }
+  VerificationContext context() {
+    return {.parameters = parameters_,
+            .clouds = *clouds_,
+            .query_descriptor = [](FrameId) { return std::nullopt; },
+            .place_descriptor = [this](FrameId frame) -> std::optional<DescriptorView> {
+              const auto found = descriptors_.find(frame);
+              if (found == descriptors_.end()) return std::nullopt;
+              return found->second;
+            },
+            .places = points_,
+            .following = following_,
+            .typical = {},
+            .newest = FrameId{90}};
+  }
+  std::vector<LoopCandidate> candidates(const Described& query, const std::vector<int>& frames) const {
+    std::vector<LoopCandidate> all;
+    for (const int frame : frames) {
+      all.push_back(match_descriptors(query.descriptor, descriptors_.at(FrameId{frame})));
+      all.back().match = FrameId{frame};
+    }
+    return all;
+  }
+
+  const SyntheticWorld home_{51};
+  Parameters parameters_;
+  std::unique_ptr<PlaceClouds> clouds_ = clouds_in_memory();
+  std::map<FrameId, IntensityScanContext> descriptors_;
+  TrajectoryPoints points_;
+  LoopFollowing following_;
+};
+
+TEST_F(LoopVerificationTest, TheRightCandidateWinsWhereverItStandsInTheList) {
+  const Described query = described(home_, SyntheticWorld::at(2.2, 0.3, 3.0));
+  const VerificationQuery question{FrameId{1000}, query.descriptor, query.cloud, nullptr, std::nullopt};
+  const VerificationContext known = context();
+  LoopVerification verification(known, question);
+  const auto answer = verification.verify(candidates(query, {90, 2}));
+  ASSERT_TRUE(answer && *answer);
+  EXPECT_TRUE((*answer)->is_accepted());
+  EXPECT_EQ((*answer)->candidate.match, FrameId{2});
+  EXPECT_EQ(verification.hypotheses().size(), 2u);
+}
+
+TEST_F(LoopVerificationTest, AnotherWorldIsRefusedForItsOverlapOrItsInliers) {
+  const Described query = described(home_, SyntheticWorld::at(2.2, 0.3, 0.0));
+  const VerificationQuery question{FrameId{1000}, query.descriptor, query.cloud, nullptr, std::nullopt};
+  for (const double min_overlap : {0.4, 0.0}) {
+    parameters_.geometric.min_overlap = min_overlap;
+    const VerificationContext known = context();
+    LoopVerification verification(known, question);
+    const auto answer = verification.verify(candidates(query, {90}));
+    ASSERT_TRUE(answer && *answer);
+    ASSERT_TRUE((*answer)->refusal);
+    EXPECT_EQ((*answer)->refusal->reason,
+              min_overlap > 0.0 ? Refusal::Reason::kLowOverlap : Refusal::Reason::kFewInliers);
+    EXPECT_EQ((*answer)->geometric.has_value(), min_overlap == 0.0) << "registered only where it is worth it";
+  }
+}
+
+TEST_F(LoopVerificationTest, OfAFarAnswerAndANearerPlaceTheNearerOneIsTested) {
+  const Described query = described(home_, SyntheticWorld::at(5.0, 0, 0));
+  const VerificationQuery question{FrameId{1000}, query.descriptor, query.cloud, nullptr, std::nullopt};
+  const VerificationContext known = context();
+  LoopVerification verification(known, question);
+  const auto answer = verification.verify(candidates(query, {1}));
+  ASSERT_TRUE(answer && *answer);
+  EXPECT_EQ((*answer)->candidate.match, FrameId{5}) << "odometry connects the places: 5 is 4 m nearer";
+  EXPECT_LT((*answer)->distance_m(), 0.1);
+}
+
+TEST_F(LoopVerificationTest, AFollowedLoopIsTestedFirstAndAlone) {
+  const TrajectoryPoint before{.segment = 7}, now = before.after(planar_pose(1, 0, 0));
+  following_.add(before, FrameId{2}, *points_.at(FrameId{2}), Pose::Identity(), 12.0);
+  const Described query = described(home_, SyntheticWorld::at(3.0, 0.1, 0));
+  const VerificationQuery question{FrameId{1001}, query.descriptor, query.cloud, nullptr, now};
+  const VerificationContext known = context();
+  LoopVerification verification(known, question);
+  const auto answer = verification.verify(candidates(query, {0, 90}));
+  ASSERT_TRUE(answer && *answer);
+  EXPECT_EQ((*answer)->candidate.match, FrameId{3});
+  EXPECT_EQ(verification.hypotheses().size(), 1u) << "sure and near: no candidate is tested";
+  parameters_.geometric.follow = false;
+  const VerificationContext without = context();
+  LoopVerification alone(without, question);
+  ASSERT_TRUE(alone.verify(candidates(query, {0, 90})));
+  EXPECT_GE(alone.hypotheses().size(), 2u);
+}
+
+TEST_F(LoopVerificationTest, APlaceThatCannotBeReadIsAnError) {
+  const Described query = described(home_, SyntheticWorld::at(2.2, 0.3, 0.0));
+  const VerificationQuery question{FrameId{1000}, query.descriptor, query.cloud, nullptr, std::nullopt};
+  const VerificationContext known = context();
+  LoopVerification verification(known, question);
+  auto unknown = candidates(query, {2});
+  unknown[0].match = FrameId{55};
+  EXPECT_FALSE(verification.verify(unknown));
+  EXPECT_FALSE(verification.verify({}).operator*().has_value()) << "no candidates, no answer";
+}
+
+}  // namespace
+}  // namespace revisit

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/verification/place_clouds.hpp>
+
+#include <map>
+#include <string>
+
+namespace revisit {
+namespace {
+
+class InMemory final : public PlaceClouds {
+ public:
+  Status put(FrameId frame, ThinCloud cloud) override {
+    clouds_[frame] = std::make_shared<const ThinCloud>(std::move(cloud));
+    return ok();
+  }
+  Result<std::shared_ptr<const ThinCloud>> get(FrameId frame) override {
+    const auto found = clouds_.find(frame);
+    if (found == clouds_.end()) return Error{"no cloud is kept of frame " + std::to_string(frame.value)};
+    return found->second;
+  }
+
+ private:
+  std::map<FrameId, std::shared_ptr<const ThinCloud>> clouds_;
+};
+
+}  // namespace
+
+std::unique_ptr<PlaceClouds> clouds_in_memory() { return std::make_unique<InMemory>(); }
+
+}  // namespace revisit

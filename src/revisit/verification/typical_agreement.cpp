@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/verification/typical_agreement.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include <revisit/registration/agreement.hpp>
+#include <revisit/verification/geometric.hpp>
+
+namespace revisit {
+namespace {
+
+struct Typical {
+  static constexpr double kStill_m = 0.05;          ///< from the same spot, intensities would agree too well
+  static constexpr double kNewShare = 0.3;          ///< of the newest pair in the running mean of inlier ratios
+  static constexpr double kFewestInliers = 0.4;     ///< of a worse pair, odometry was wrong
+  static constexpr std::size_t kFewestPairs = 10;   ///< before, the defaults are better
+  static constexpr double kLeastCorrelation = 0.1;  ///< intensities that agree worse even here tell nothing elsewhere
+};
+
+}  // namespace
+
+bool TypicalAgreementEstimate::add(const ScanGeometry& previous, const ScanGeometry& current,
+                                   const Pose& T_previous_current) {
+  const Agreement agreement =
+      measure_agreement(previous.surface(), current.surface(), T_previous_current, LearntWith::kInlierDistance_m);
+  if (agreement.inlier_ratio < Typical::kFewestInliers) return false;
+  if (agreement.intensity_correlation && T_previous_current.translation().norm() > Typical::kStill_m)
+    add_correlation(*agreement.intensity_correlation, 1);
+  const double ratio = agreement.inlier_ratio;
+  recent_inlier_ratio_ =
+      recent_inlier_ratio_ ? *recent_inlier_ratio_ + Typical::kNewShare * (ratio - *recent_inlier_ratio_) : ratio;
+  inlier_ratio_sum_ += ratio;
+  ++inlier_pairs_;
+  return true;
+}
+
+void TypicalAgreementEstimate::restore(const TypicalAgreement& typical, std::size_t pairs) {
+  inlier_ratio_sum_ += static_cast<double>(pairs) * typical.inlier_ratio;
+  inlier_pairs_ += pairs;
+  add_correlation(typical.intensity_correlation, static_cast<std::uint32_t>(pairs));
+}
+
+void TypicalAgreementEstimate::add_correlation(double correlation, std::uint32_t times) {
+  correlations_[static_cast<std::size_t>(std::lround(std::clamp(correlation, 0.0, 1.0) * kLastBin))] += times;
+  correlation_pairs_ += times;
+}
+
+TypicalAgreement TypicalAgreementEstimate::overall() const {
+  TypicalAgreement typical;
+  if (inlier_pairs_ >= Typical::kFewestPairs)
+    typical.inlier_ratio = inlier_ratio_sum_ / static_cast<double>(inlier_pairs_);
+  if (correlation_pairs_ < Typical::kFewestPairs) return typical;
+  std::size_t bin = 0, below = correlations_[0];
+  while (2 * below < correlation_pairs_) below += correlations_[++bin];
+  typical.intensity_correlation = std::max(Typical::kLeastCorrelation, static_cast<double>(bin) / kLastBin);
+  return typical;
+}
+
+TypicalAgreement TypicalAgreementEstimate::recent() const {
+  TypicalAgreement typical = overall();
+  typical.inlier_ratio = recent_inlier_ratio_.value_or(typical.inlier_ratio);
+  return typical;
+}
+
+}  // namespace revisit

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/verification/typical_agreement.hpp>
+
+#include <gtest/gtest.h>
+
+#include "synthetic_world.hpp"
+
+namespace revisit {
+namespace {
+
+using testing_support::SyntheticWorld;
+
+// A drive along x, half a metre a scan; every second scan of `noisy` has shuffled intensities.
+ScanGeometry scan_at(int i, bool has_intensity = true) {
+  static const SyntheticWorld world(31);
+  Scan scan = world.scan(SyntheticWorld::at(0.5 * i, 0, 0), {32, 450, -24.8, 5.0}, static_cast<unsigned>(i));
+  std::vector<std::uint8_t> ground;
+  for (Point& p : scan.points) {
+    ground.push_back(p.z < -1.6f);
+    if (!has_intensity) p.intensity = 1.f;
+  }
+  return ScanGeometry(thin(scan.points, ground, 1.0));
+}
+
+TEST(TypicalAgreement, HasDefaultsUntilTenPairsAreKnown) {
+  TypicalAgreementEstimate estimate;
+  const TypicalAgreement defaults;
+  for (int i = 0; i < 9; ++i) EXPECT_TRUE(estimate.add(scan_at(i), scan_at(i + 1), planar_pose(0.5, 0, 0)));
+  EXPECT_EQ(estimate.overall().inlier_ratio, defaults.inlier_ratio);
+  EXPECT_EQ(estimate.overall().intensity_correlation, defaults.intensity_correlation);
+  EXPECT_NE(estimate.recent().inlier_ratio, defaults.inlier_ratio) << "the last few are known at once";
+  estimate.add(scan_at(9), scan_at(10), planar_pose(0.5, 0, 0));
+  EXPECT_NE(estimate.overall().inlier_ratio, defaults.inlier_ratio);
+  EXPECT_GT(estimate.overall().intensity_correlation, 0.3);
+  EXPECT_LE(estimate.overall().intensity_correlation, 1.0);
+}
+
+TEST(TypicalAgreement, APairAtAWrongPoseIsRefusedAndTeachesNothing) {
+  TypicalAgreementEstimate estimate;
+  EXPECT_FALSE(estimate.add(scan_at(0), scan_at(1), planar_pose(0.5, 4.0, 0.4)));
+  EXPECT_EQ(estimate.pairs(), 0u);
+}
+
+TEST(TypicalAgreement, AfterAnInterruptionOnlyTheOverallOneIsKnown) {
+  TypicalAgreementEstimate estimate;
+  estimate.restore({0.7, 0.6}, 40);
+  EXPECT_NEAR(estimate.overall().inlier_ratio, 0.7, 1e-9);
+  EXPECT_NEAR(estimate.overall().intensity_correlation, 0.6, 1e-9);
+  estimate.add(scan_at(0), scan_at(1), planar_pose(0.5, 0, 0));
+  EXPECT_GT(estimate.recent().inlier_ratio, 0.8) << "the last pair";
+  estimate.interrupt();
+  EXPECT_NEAR(estimate.recent().inlier_ratio, 0.7, 0.01);
+}
+
+TEST(TypicalAgreement, IntensitiesThatSayNothingLeaveTheirDefault) {
+  TypicalAgreementEstimate estimate;
+  for (int i = 0; i < 12; ++i) estimate.add(scan_at(i, false), scan_at(i + 1, false), planar_pose(0.5, 0, 0));
+  EXPECT_EQ(estimate.overall().intensity_correlation, TypicalAgreement{}.intensity_correlation);
+}
+
+}  // namespace
+}  // namespace revisit
