@@ -158,11 +158,43 @@ TEST(Cli, CompareRunsEachMethodOverTheSameScans) {
   EXPECT_NE(without.output.find("--poses"), std::string::npos) << without.output;
 }
 
+// A map of `revisit slam` answers without its scans; the same folder is no recording.
+TEST(Cli, DetectLooksForScansInASavedMap) {
+  const fs::path folder = fresh_folder(), recording = there_and_back(folder / "recording"), map = folder / "map";
+  const Outcome slam = run("slam " + recording.string() + " --odometry " + (recording / "poses.txt").string() +
+                           " --out " + map.string());
+  ASSERT_EQ(slam.code, 0) << slam.output;
+  const std::string query = " --out " + (folder / "found").string() + " --overwrite";
+  for (const fs::path& database : {map, map / "map.sqlite"}) {
+    const Outcome found = run("detect " + recording.string() + " --database " + database.string() + query);
+    ASSERT_EQ(found.code, 0) << found.output;
+    EXPECT_GE(read_loops(folder / "found" / "loops.csv")->size(), 10u) << found.output;
+  }
+  fs::remove(map / "map.sqlite");
+  const Outcome exports = run("detect " + recording.string() + " --database " + map.string() + query);
+  EXPECT_EQ(exports.code, 1);
+  EXPECT_NE(exports.output.find("holds a map"), std::string::npos) << exports.output;
+}
+
 TEST(Cli, ASearchWithoutAPastSaysSo) {
   const fs::path folder = fresh_folder(), recording = there_and_back(folder / "recording");
   const Outcome outcome = run("detect " + recording.string() + " --out " + (folder / "out").string());
   EXPECT_EQ(outcome.code, 0);
   EXPECT_NE(outcome.output.find("no scan had a searchable past"), std::string::npos) << outcome.output;
+}
+
+// 0.1 s a frame is a guess: by it, the 30 s of the exclusion would leave next to nothing to search.
+TEST(Cli, WithoutTimesFramesAloneExclude) {
+  const fs::path folder = fresh_folder(), recording = there_and_back(folder / "recording"), out = folder / "out";
+  fs::remove(recording / "times.txt");
+  const Outcome outcome =
+      run("detect " + recording.string() + " --out " + out.string() + " --retrieval.exclude_frames 4");
+  EXPECT_EQ(outcome.code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("the recording has no times: 0.1 s a frame is assumed"), std::string::npos)
+      << outcome.output;
+  EXPECT_EQ(read_candidates(out / "candidates.csv")->size(), 8u);
+  EXPECT_GE(read_loops(out / "loops.csv")->size(), 3u);
+  EXPECT_NE(content(out / "run.json").find("\"retrieval.exclude_s\": 0"), std::string::npos);
 }
 
 TEST(Cli, ABrokenScanAmongGoodOnesIsSkippedAndTold) {
@@ -197,7 +229,7 @@ TEST(Cli, RecordingsOfNoUseFailWithAMessage) {
     EXPECT_EQ(run("describe " + (recording / "000000.bin").string() + " --out " + (folder / "a.png").string()).code, 1)
         << each.name;
   }
-  EXPECT_NE(run("detect /no/such --out /tmp/x").output.find("/no/such: no such folder"), std::string::npos);
+  EXPECT_NE(run("detect /no/such --out /tmp/x").output.find("/no/such: no such file or folder"), std::string::npos);
   fs::create_directories(folder / "nothing");
   const Outcome nothing = run("detect " + (folder / "nothing").string() + " --out " + (folder / "o").string());
   EXPECT_EQ(nothing.code, 1);
@@ -316,6 +348,7 @@ TEST(Cli, DescribeDrawsAndInfoTells) {
       run("describe " + recording.string() + " --out " + (folder / "b.png").string()).output.find("is a recording"),
       std::string::npos);
   EXPECT_EQ(run("info " + scan).code, 0);
+  EXPECT_NE(run("info /no/such/thing").output.find("/no/such/thing: no such file or folder"), std::string::npos);
   EXPECT_EQ(run("info /no/such.bin").code, 1);
 }
 

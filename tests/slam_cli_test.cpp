@@ -93,6 +93,33 @@ TEST(SlamCli, GoesOnAfterAKill) {
   EXPECT_EQ(read_poses(out / "poses.tum")->rows.size(), 40u);
 }
 
+// Longer than rounding needs to grow where poses are made from poses and never normalised.
+TEST(SlamCli, TakesTheOdometryOfALongRecording) {
+  const fs::path folder = fresh_folder(), drive = folder / "drive";
+  const auto simulated = run("simulate --sensor vlp16 --frames 120 --length_m 100 --out " + drive.string());
+  ASSERT_EQ(simulated.code, 0) << simulated.output;
+  const auto outcome = run("slam " + drive.string() + " --no-map --odometry " + (drive / "odometry.tum").string() +
+                           " --poses " + (drive / "poses.txt").string() + " --out " + (folder / "out").string());
+  EXPECT_EQ(outcome.code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("120 scans"), std::string::npos) << outcome.output;
+}
+
+TEST(SlamCli, NamesTheScansItDidNotTrack) {
+  const fs::path folder = fresh_folder(), drive = folder / "drive";
+  ASSERT_EQ(run("simulate --sensor vlp16 --frames 30 --length_m 50 --out " + drive.string()).code, 0);
+  std::ifstream all(drive / "odometry.tum");
+  std::ofstream some(folder / "some.tum");
+  int row = 0;
+  for (std::string line; std::getline(all, line); ++row)
+    if (row < 10 || row > 12) some << line << '\n';
+  some.close();
+  const auto outcome = run("slam " + drive.string() + " --no-map --odometry " + (folder / "some.tum").string() +
+                           " --out " + (folder / "out").string());
+  EXPECT_EQ(outcome.code, 3) << outcome.output;
+  EXPECT_NE(outcome.output.find("not tracked: frames "), std::string::npos) << outcome.output;
+  EXPECT_NE(run("--help").output.find("not tracked"), std::string::npos);
+}
+
 TEST(SlamCli, SaysWhatItCannotDo) {
   const fs::path folder = fresh_folder(), drive = small_drive(folder);
   const std::string out = " --out " + (folder / "x").string();

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <charconv>
 #include <iomanip>
+#include <mutex>
+#include <set>
 
 #include <revisit/io/internal/kitti_folder.hpp>
 #include <revisit/io/internal/text_writer.hpp>
@@ -21,6 +23,27 @@ struct ScanFile {
   double stamp_s = 0.0;
 };
 
+// Remarks about single files, each kind of them once: the first file speaks for the others.
+class Remarks {
+ public:
+  void set_log(LogSink log) { log_ = std::move(log); }
+  const LogSink& log() const { return log_; }
+  /// A sink for what is said about this file. Safe to call from several threads.
+  LogSink about(const fs::path& file) const {
+    return [this, file](LogLevel level, const std::string& message) {
+      const std::string prefix = file.string() + ": ";
+      const std::string remark = message.starts_with(prefix) ? message.substr(prefix.size()) : message;
+      const std::scoped_lock lock(mutex_);
+      if (said_.insert(remark).second) log_to(log_, level, prefix + remark + " (said once for the recording)");
+    };
+  }
+
+ private:
+  LogSink log_;
+  mutable std::mutex mutex_;
+  mutable std::set<std::string> said_;
+};
+
 class FolderRecording final : public Recording {
  public:
   std::string kind_;
@@ -29,7 +52,7 @@ class FolderRecording final : public Recording {
   Trajectory trajectory_, wheel_odometry_;
   std::optional<Pose> T_camera_lidar_;
   fs::path point_values_;  // where times and rings of points may stand
-  LogSink log_;
+  Remarks remarks_;
 
   std::size_t size() const override { return scans_.size(); }
   FrameId frame(std::size_t index) const override { return scans_.at(index).frame; }
@@ -41,7 +64,8 @@ class FolderRecording final : public Recording {
   std::optional<Pose> T_camera_lidar() const override { return T_camera_lidar_; }
 
   Result<Scan> read(std::size_t index) const override {
-    auto scan = read_scan(scans_.at(index).file, log_);
+    const fs::path& file = scans_.at(index).file;
+    auto scan = read_scan(file, remarks_.about(file));
     if (!scan) return scan;
     if (!point_values_.empty())
       if (const Status status = io_internal::read_point_values(point_values_, scans_[index].file.filename(), *scan);
@@ -85,16 +109,37 @@ bool is_present(const fs::path& path) {
   return fs::status(path, failure).type() != fs::file_type::not_found;
 }
 
-// Names of 13 digits and more are times since 1970 in milli-, micro- or nanoseconds (NCLT, ROS): seconds a unit.
+// What `revisit slam` wrote holds a map.ply and a map.pcd, which are no scans.
+bool is_map_folder(const fs::path& folder) {
+  std::error_code failure;
+  return fs::is_regular_file(folder / "tiles" / "tiles.json", failure) ||
+         fs::is_regular_file(folder / "map.sqlite", failure);
+}
+
+// Names may be times: of 13 digits and more since 1970 in milli-, micro- or nanoseconds (NCLT, ROS), or since the
+// sensor started, in micro- or nanoseconds, which their steps tell: frames are not counted in ten thousands. Seconds a
+// unit.
 std::optional<double> unit_of_time_in_names(const std::map<FrameId, fs::path>& by_number) {
+  std::vector<std::int64_t> steps;
+  for (auto it = by_number.begin(); std::next(it) != by_number.end(); ++it)
+    steps.push_back(std::next(it)->first.value - it->first.value);
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  if (!steps.empty()) std::nth_element(steps.begin(), middle, steps.end());
+  const double step = steps.empty() ? 0.0 : static_cast<double>(*middle);
+  constexpr double kLongestStep_s = 600.0;  // between two scans of a recording
   const double first = static_cast<double>(by_number.begin()->first.value);
   for (const double unit_s : {1e-3, 1e-6, 1e-9})
-    if (first * unit_s > 3e8 && first * unit_s < 1e10) return unit_s;  // 1979 to 2286
+    if (first >= 1e12 && first * unit_s < 1e10 && step * unit_s < kLongestStep_s) return unit_s;  // until 2286
+  constexpr double kLeastStep_us = 2e4, kLeastStep_ns = 1e7;  // 50 and 100 scans a second
+  if (step >= kLeastStep_ns) return 1e-9;
+  if (step >= kLeastStep_us) return 1e-6;
   return std::nullopt;
 }
 
 // Frame numbers come from the names; where those are times, or do not tell the files apart, from the order.
 Status list_scans(const fs::path& folder, FolderRecording& recording) {
+  if (is_map_folder(folder))
+    return Error{folder.string() + ": holds a map of `revisit slam`, not the scans of a recording"};
   std::vector<fs::path> files;
   std::error_code failure;
   for (fs::directory_iterator it(folder, failure), end; !failure && it != end; it.increment(failure))
@@ -121,25 +166,33 @@ Status list_scans(const fs::path& folder, FolderRecording& recording) {
   return ok();
 }
 
-// Rows of times are counted by frame number.
+// The row of each scan in a file of `rows` rows: by frame number or, where the numbers go beyond the rows and there is
+// a row a scan, in the order of the scans.
+std::vector<std::size_t> rows_of(const std::vector<ScanFile>& scans, std::size_t rows) {
+  const bool in_order = rows == scans.size() && static_cast<std::size_t>(scans.back().frame.value) >= rows;
+  std::vector<std::size_t> result(scans.size());
+  for (std::size_t i = 0; i < scans.size(); ++i)
+    result[i] = in_order ? i : static_cast<std::size_t>(scans[i].frame.value);
+  return result;
+}
+
 Status set_stamps(FolderRecording& recording, const fs::path& file, const Result<std::vector<double>>& times) {
   if (!times) return times.error();
-  for (ScanFile& scan : recording.scans_) {
-    if (static_cast<std::size_t>(scan.frame.value) >= times->size())
+  const std::vector<std::size_t> rows = rows_of(recording.scans_, times->size());
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    if (rows[i] >= times->size())
       return Error{file.string() + ": " + std::to_string(times->size()) + " rows, but frame " +
-                   std::to_string(scan.frame.value) + " needs row " + std::to_string(scan.frame.value + 1)};
-    scan.stamp_s = (*times)[static_cast<std::size_t>(scan.frame.value)];
-  }
+                   std::to_string(recording.scans_[i].frame.value) + " needs row " + std::to_string(rows[i] + 1)};
+  for (std::size_t i = 0; i < rows.size(); ++i) recording.scans_[i].stamp_s = (*times)[rows[i]];
   recording.has_times_ = true;
   return ok();
 }
 
-Status add_kitti_odometry(FolderRecording& recording, const fs::path& folder) {
-  recording.kind_ = "KITTI odometry folder";
-  recording.point_values_ = folder;
-  if (const auto file = folder / "times.txt"; is_present(file))
+// times.txt, calib.txt and poses.txt of a folder of scans.
+Status add_side_files(FolderRecording& recording, const fs::path& folder) {
+  if (const fs::path file = folder / "times.txt"; is_present(file) && !recording.has_times_)
     if (const Status status = set_stamps(recording, file, io_internal::read_times(file)); !status) return status;
-  if (const auto file = folder / "calib.txt"; is_present(file)) {
+  if (const fs::path file = folder / "calib.txt"; is_present(file)) {
     const auto Tr = io_internal::read_kitti_calibration(file, "Tr");
     if (!Tr) return Tr.error();
     recording.T_camera_lidar_ = *Tr;
@@ -147,12 +200,32 @@ Status add_kitti_odometry(FolderRecording& recording, const fs::path& folder) {
   for (const char* name : {"poses.txt", "poses_subset.txt"}) {
     const fs::path file = folder / name;
     if (!is_present(file)) continue;
-    const auto poses = read_poses(file);
+    auto poses = read_poses(file);
     if (!poses) return poses.error();
+    const std::vector<std::size_t> rows = rows_of(recording.scans_, poses->rows.size());
+    if (poses->format == PoseFormat::kKitti && rows.back() + 1 == poses->rows.size())
+      for (std::size_t i = 0; i < rows.size(); ++i) poses->rows[rows[i]].frame = recording.scans_[i].frame;
     recording.trajectory_ = recording.of_scans(*poses);
-    break;
+    return ok();
   }
   return ok();
+}
+
+// In a folder of scans, or else beside it, where they may belong to something else.
+Status find_side_files(FolderRecording& recording, const fs::path& folder) {
+  const bool are_inside = is_present(folder / "times.txt") || is_present(folder / "poses.txt");
+  if (are_inside) return add_side_files(recording, folder);
+  const fs::path beside = fs::absolute(folder / "..").lexically_normal();
+  const Status status = add_side_files(recording, beside);
+  if (!status)
+    log_to(recording.remarks_.log(), LogLevel::kWarning, status.error().message + "; what stands beside is left out");
+  return ok();
+}
+
+Status add_kitti_odometry(FolderRecording& recording, const fs::path& folder) {
+  recording.kind_ = "KITTI odometry folder";
+  recording.point_values_ = folder;
+  return add_side_files(recording, folder);
 }
 
 Status add_kitti_raw(FolderRecording& recording, const fs::path& folder) {
@@ -170,7 +243,7 @@ Status add_kitti_raw(FolderRecording& recording, const fs::path& folder) {
     if (!calibration) return calibration.error();
     T_lidar_imu = *calibration;
   } else {
-    log_to(recording.log_, LogLevel::kWarning,
+    log_to(recording.remarks_.log(), LogLevel::kWarning,
            beside.string() + ": missing, and the IMU's poses are not the LiDAR's: they are left out");
     return ok();
   }
@@ -190,20 +263,20 @@ Result<std::unique_ptr<Recording>> open_recording(const fs::path& folder, const 
                                                   const fs::path& poses_file) {
   std::error_code failure;
   const fs::file_status status = fs::status(folder, failure);
-  if (status.type() == fs::file_type::not_found) return Error{folder.string() + ": no such folder"};
+  if (status.type() == fs::file_type::not_found) return Error{folder.string() + ": no such file or folder"};
   if (failure) return Error{folder.string() + ": cannot be read: " + failure.message()};
   if (!fs::is_directory(status)) return Error{folder.string() + ": is not a folder of scans"};
 
   const fs::path raw = folder / "velodyne_points" / "data", odometry = folder / "velodyne";
   const bool is_raw = fs::is_directory(raw, failure), is_odometry = fs::is_directory(odometry, failure);
   auto recording = std::make_unique<FolderRecording>();
-  recording->log_ = log;
+  recording->remarks_.set_log(log);
   recording->kind_ = "folder of scans";
   if (const Status listed = list_scans(is_raw ? raw : is_odometry ? odometry : folder, *recording); !listed)
     return listed.error();
   if (const Status added = is_raw        ? add_kitti_raw(*recording, folder)
                            : is_odometry ? add_kitti_odometry(*recording, folder)
-                                         : ok();
+                                         : find_side_files(*recording, folder);
       !added)
     return added.error();
   if (const fs::path wheels = folder / "wheel_odometry.tum"; is_present(wheels)) {

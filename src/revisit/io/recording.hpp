@@ -36,10 +36,10 @@ class Recording {
 };
 
 /// Opens a KITTI odometry folder (velodyne/, times.txt, calib.txt, poses.txt, point times and rings if there are any),
-/// a KITTI raw drive (velodyne_points/data/, oxts/), or a bare folder of .bin, .pcd or .ply scans. The first two may
-/// have a wheel_odometry.tum (poses of the LiDAR). Poses, times and calibration that are there but broken are errors;
-/// scans are only looked at when they are read. `poses_file` (KITTI, TUM or g2o) stands in for the poses that the
-/// folder has, if any.
+/// a KITTI raw drive (velodyne_points/data/, oxts/), or a folder of .bin, .pcd or .ply scans, with times.txt, poses.txt
+/// and calib.txt in it or beside it where there are any. The first two may have a wheel_odometry.tum (poses of the
+/// LiDAR). Poses, times and calibration that are there but broken are errors; scans are only looked at when they are
+/// read. `poses_file` (KITTI, TUM or g2o) stands in for the poses that the folder has, if any.
 Result<std::unique_ptr<Recording>> open_recording(const std::filesystem::path& folder, const LogSink& log = {},
                                                   const std::filesystem::path& poses_file = {});
 

@@ -47,6 +47,75 @@ TEST(Recording, NamesThatAreTimesGiveStampsAndFramesAreCounted) {
   EXPECT_TRUE((*recording)->has_times());
 }
 
+TEST(Recording, NamesThatAreNanosecondsSinceBootAreTimes) {
+  const fs::path folder = fresh_folder();
+  for (const char* name : {"412300000000.bin", "412400021000.bin", "412499873000.bin"}) write_bin(folder / name, 1.f);
+  const auto recording = open_recording(folder);
+  ASSERT_TRUE(recording);
+  EXPECT_TRUE((*recording)->has_times());
+  EXPECT_EQ((*recording)->frame(2).value, 2);
+  EXPECT_NEAR((*recording)->stamp_s(1), 412.400021, 1e-9);
+  const fs::path frames = fresh_folder() / "frames";
+  fs::create_directories(frames);
+  for (const char* name : {"000100.bin", "000200.bin", "010000.bin"}) write_bin(frames / name, 1.f);
+  const auto counted = open_recording(frames);
+  ASSERT_TRUE(counted);
+  EXPECT_FALSE((*counted)->has_times());
+  EXPECT_EQ((*counted)->frame(2).value, 10000);
+}
+
+TEST(Recording, TimesAndPosesStandInAFolderOfScansOrBesideIt) {
+  const fs::path folder = fresh_folder(), scans = folder / "scans";
+  fs::create_directories(scans);
+  for (const char* name : {"000007.bin", "000008.bin"}) write_bin(scans / name, 1.f);
+  const auto write = [](const fs::path& where, const char* offset) {
+    std::ofstream(where / "times.txt") << offset << "0.5\n" << offset << "1.0\n";
+    std::ofstream(where / "poses.txt") << "1 0 0 " << offset << " 0 1 0 0 0 0 1 0\n1 0 0 5 0 1 0 0 0 0 1 0\n";
+  };
+  write(folder, "3");
+  auto recording = open_recording(scans);
+  ASSERT_TRUE(recording) << recording.error().message;
+  EXPECT_TRUE((*recording)->has_times());
+  EXPECT_DOUBLE_EQ((*recording)->stamp_s(0), 30.5) << "a row a scan: in their order";
+  ASSERT_EQ((*recording)->trajectory().entries.size(), 2u);
+  EXPECT_DOUBLE_EQ((*recording)->trajectory().at(FrameId{7})->translation().x(), 3.0);
+  write(scans, "4");
+  recording = open_recording(scans);
+  EXPECT_DOUBLE_EQ((*recording)->stamp_s(0), 40.5) << "those inside come first";
+  fs::remove(scans / "times.txt");
+  fs::remove(scans / "poses.txt");
+  std::ofstream(folder / "times.txt") << "1\n";
+  std::string warning;
+  recording = open_recording(scans, [&](LogLevel, const std::string& message) { warning = message; });
+  ASSERT_TRUE(recording) << "what stands beside may belong to something else";
+  EXPECT_FALSE((*recording)->has_times());
+  EXPECT_NE(warning.find("needs row 8"), std::string::npos) << warning;
+}
+
+TEST(Recording, AMapIsNoRecording) {
+  const fs::path folder = fresh_folder();
+  write_bin(folder / "map.bin", 1.f);
+  fs::create_directories(folder / "tiles");
+  std::ofstream(folder / "tiles" / "tiles.json") << "{}";
+  EXPECT_NE(open_recording(folder).error().message.find("holds a map"), std::string::npos);
+}
+
+TEST(Recording, ARemarkAboutItsFilesIsMadeOnce) {
+  const fs::path folder = fresh_folder();
+  for (int i = 0; i < 5; ++i) {
+    std::ofstream file(folder / (std::to_string(i) + ".pcd"));
+    file << "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\n"
+            "VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\nDATA ascii\n1 2 3\n4 5 6\n";
+  }
+  int remarks = 0;
+  const auto recording = open_recording(folder, [&](LogLevel, const std::string& message) {
+    remarks += message.find("no intensity field") != std::string::npos;
+  });
+  ASSERT_TRUE(recording);
+  for (std::size_t i = 0; i < 5; ++i) ASSERT_TRUE((*recording)->read(i));
+  EXPECT_EQ(remarks, 1);
+}
+
 TEST(Recording, PosesMayComeFromAFileOfTheirOwn) {
   const fs::path folder = fresh_folder();
   write_bin(folder / "3.bin", 1.f);
@@ -100,7 +169,7 @@ TEST(Recording, NamesWithoutNumbersAreTakenInAlphabeticalOrder) {
 }
 
 TEST(Recording, FoldersThatCannotServeAreNamed) {
-  EXPECT_NE(open_recording("/no/such").error().message.find("/no/such: no such folder"), std::string::npos);
+  EXPECT_NE(open_recording("/no/such").error().message.find("/no/such: no such file or folder"), std::string::npos);
   const fs::path folder = fresh_folder();
   EXPECT_NE(open_recording(folder).error().message.find("holds no scan"), std::string::npos);
   write_bin(folder / "0.bin", 1.f);

@@ -19,6 +19,9 @@ std::string lower_extension(const std::filesystem::path& file) {
 }
 
 Result<Scan> read_any(const std::filesystem::path& file, const LogSink& log) {
+  std::error_code failure;
+  if (!std::filesystem::exists(file, failure))
+    return Error{file.string() + ": no such file or folder" + (failure ? " (" + failure.message() + ")" : "")};
   const std::string extension = lower_extension(file);
   if (extension == ".bin") return io_internal::read_bin(file);
   if (extension == ".pcd") return io_internal::read_pcd(file, log);

@@ -134,10 +134,11 @@ TEST(ReadBin, NothingUsableIsAnError) {
 }
 
 TEST(ReadScan, KindsThatAreNotReadSayWhatToDo) {
-  EXPECT_NE(read_scan("a.pcap").error().message.find("not supported yet"), std::string::npos);
-  EXPECT_NE(read_scan("a.bag").error().message.find("not supported yet"), std::string::npos);
-  EXPECT_NE(read_scan("a.txt").error().message.find("allowed: .bin, .pcd, .ply"), std::string::npos);
-  EXPECT_NE(read_scan("/no/such.bin").error().message.find("No such file"), std::string::npos);
+  EXPECT_NE(read_scan(write_file("a.pcap", "x")).error().message.find("not supported yet"), std::string::npos);
+  EXPECT_NE(read_scan(write_file("a.bag", "x")).error().message.find("not supported yet"), std::string::npos);
+  EXPECT_NE(read_scan(write_file("a.txt", "x")).error().message.find("allowed: .bin, .pcd, .ply"), std::string::npos);
+  for (const char* missing : {"/no/such.bin", "/no/such", "nowhere.txt"})
+    EXPECT_EQ(read_scan(missing).error().message, missing + std::string(": no such file or folder"));
 }
 
 std::string pcd(const std::string& fields, const std::string& sizes, const std::string& types,

@@ -121,6 +121,36 @@ std::vector<double> find_lines(const std::vector<double>& histogram) {
   return lines;
 }
 
+// Leaves out what is no line of its own: the fainter of two that stand much closer than those around them (beams whose
+// origins lie apart show near surfaces beside their line), and stragglers beyond the outermost line.
+std::vector<double> without_doubles(std::vector<double> lines, const std::vector<double>& histogram) {
+  constexpr double kClose = 0.35;      // of the median gap around
+  constexpr double kStraggler = 0.35;  // of the points of the line beside it, no farther off than that from its own
+  const auto points = [&](std::size_t i) { return histogram[static_cast<std::size_t>(lines[i])]; };
+  const auto remove = [&](std::size_t i) { lines.erase(lines.begin() + static_cast<std::ptrdiff_t>(i)); };
+  for (std::size_t i = 0; i + 1 < lines.size();) {
+    std::vector<double> around;
+    for (std::size_t j = i < 3 ? 0 : i - 3; j <= i + 3 && j + 1 < lines.size(); ++j)
+      if (j != i) around.push_back(lines[j + 1] - lines[j]);
+    if (around.size() < 3) break;
+    const auto median = around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2);
+    std::nth_element(around.begin(), median, around.end());
+    if (lines[i + 1] - lines[i] < kClose * *median)
+      remove(points(i) < points(i + 1) ? i : i + 1);
+    else
+      ++i;
+  }
+  // A sensor whose lines spread towards the edge has few points on the outermost, but at a wider gap.
+  const auto is_straggler = [&](std::size_t outer, std::size_t inner, std::size_t third) {
+    constexpr double kWider = 1.5;
+    return points(outer) < kStraggler * points(inner) &&
+           std::abs(lines[outer] - lines[inner]) < kWider * 0.5 * std::abs(lines[inner] - lines[third]);
+  };
+  if (const std::size_t n = lines.size(); n > 3 && is_straggler(n - 1, n - 2, n - 4)) remove(n - 1);
+  if (lines.size() > 3 && is_straggler(0, 1, 3)) remove(0);
+  return lines;
+}
+
 std::optional<Rings> rings_from_elevation(const std::vector<float>& elevations) {
   constexpr double kBin_rad = 0.05 / 180.0 * kPi;
   constexpr std::size_t kBins = 3600;
@@ -135,7 +165,7 @@ std::optional<Rings> rings_from_elevation(const std::vector<float>& elevations) 
   // A line on the border of two bins must not look like two lines.
   std::vector<double> smooth(kBins, 0.0);
   for (std::size_t i = 1; i + 1 < kBins; ++i) smooth[i] = histogram[i - 1] + 2.0 * histogram[i] + histogram[i + 1];
-  const std::vector<double> lines = find_lines(smooth);
+  const std::vector<double> lines = without_doubles(find_lines(smooth), smooth);
   constexpr std::size_t kFewestLines = 4;
   if (lines.size() < kFewestLines || lines.size() > kMostRings) return std::nullopt;
 

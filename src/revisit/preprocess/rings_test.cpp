@@ -5,12 +5,15 @@
 #include <numeric>
 #include <random>
 
+#include <revisit/io/scan_file.hpp>
+
 #include "shared_data.hpp"
 #include "synthetic_world.hpp"
 
 namespace revisit {
 namespace {
 
+using testing_support::shared_data;
 using testing_support::SyntheticWorld;
 
 struct RingCase {
@@ -53,6 +56,41 @@ INSTANTIATE_TEST_SUITE_P(Sensors, RecoveredRings,
                          testing::Values(RingCase{16, -15.0, 15.0}, RingCase{32, -30.67, 10.67},
                                          RingCase{64, -24.8, 2.0}),
                          [](const auto& each) { return std::to_string(each.param.rings) + "_lines"; });
+
+// What an Ouster shows of surfaces a metre away: beams do not start in one point, and stand beside their line.
+TEST(FindRings, LinesThatNearSurfacesDoubleCountOnce) {
+  Scan scan;
+  std::mt19937 random(6);
+  std::normal_distribution<double> off_deg(0.0, 0.01);
+  const auto add = [&](double elevation_deg, int points) {
+    for (int i = 0; i < points; ++i) {
+      const double e = to_radians(elevation_deg + off_deg(random)), a = 2.0 * kPi * i / points;
+      scan.points.push_back({static_cast<float>(10.0 * std::cos(e) * std::cos(a)),
+                             static_cast<float>(10.0 * std::cos(e) * std::sin(a)),
+                             static_cast<float>(10.0 * std::sin(e)), 0.f});
+    }
+  };
+  for (int line = 0; line < 64; ++line) add(-44.0 + 1.4 * line, 400);
+  add(-44.0 + 1.4 * 25 + 0.32, 130);
+  add(-44.0 + 1.4 * 30 - 0.25, 180);
+  add(-44.0 + 1.4 * 64, 90);
+  EXPECT_EQ(find_rings(scan).count(), 64u);
+}
+
+TEST(FindRings, CountsTheLinesOfRealSensors) {
+  REVISIT_NEEDS_SHARED_DATA();
+  struct Case {
+    const char* file;
+    std::size_t lines;
+  };
+  for (const Case& each :
+       {Case{"handheld_os0.pcd", 64}, Case{"ouster_intensity_7000.pcd", 128}, Case{"rellis_os1.bin", 64},
+        Case{"rellis_vlp32.bin", 32}, Case{"hdl32_pair_a.pcd", 32}, Case{"vlp16_nan_unorganised_ring_time.pcd", 16}}) {
+    const auto scan = read_scan(shared_data() / "formats" / each.file);
+    ASSERT_TRUE(scan) << each.file;
+    EXPECT_EQ(find_rings(*scan).count(), each.lines) << each.file;
+  }
+}
 
 TEST(FindRings, TakesTheFilesOwnAndNumbersThemFromBelow) {
   Scan scan;
