@@ -12,6 +12,7 @@ install(EXPORT revisitTargets NAMESPACE revisit:: DESTINATION ${CMAKE_INSTALL_LI
 install(DIRECTORY src/revisit DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
   FILES_MATCHING PATTERN "*.hpp" PATTERN "*.h" PATTERN internal EXCLUDE)
 
+list(TRANSFORM modules REPLACE "^revisit_" "" OUTPUT_VARIABLE REVISIT_COMPONENTS)
 set(config_dir ${CMAKE_INSTALL_LIBDIR}/cmake/revisit)
 configure_package_config_file(cmake/revisitConfig.cmake.in ${CMAKE_CURRENT_BINARY_DIR}/revisitConfig.cmake
   INSTALL_DESTINATION ${config_dir})

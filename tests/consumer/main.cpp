@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
 
-#include <revisit/evaluation/loop_table.hpp>
 #include <revisit/pipeline/loop_detector.hpp>
 
 // Feeds a detector two scans of the same few walls, long apart: the second must be recognised.

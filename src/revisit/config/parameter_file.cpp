@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <sstream>
 
+#define TOML_HEADER_ONLY 1  // whoever links this library needs no other
 #include <toml++/toml.h>
 
 namespace revisit {

@@ -4,9 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <pcl/features/fpfh.h>
 #include <pcl/point_types.h>
 #include <pcl/registration/gicp.h>
 #include <pcl/registration/icp.h>
+#include <pcl/search/kdtree.h>
 
 #include <revisit/registration/agreement.hpp>
 #include <revisit/registration/feature_alignment.hpp>
@@ -309,6 +311,38 @@ TEST(Features, FindATurnWithoutAnyGuess) {
   EXPECT_LT(error_deg(result->T_target_source, T_truth), 5.0);
   const SurfaceCloud nothing(ThinCloud{});
   EXPECT_FALSE(align_features(a, compute_features(a, 3.0), nothing, compute_features(nothing, 3.0)));
+}
+
+// PCL leaves out a point's own histogram and picks other frames where two angles are alike: near, not equal.
+TEST(Features, AreNearlyThoseOfPcl) {
+  const SurfaceCloud cloud(thin_scan(SyntheticWorld::at(0, 0, 0)));
+  const Features ours = compute_features(cloud, 3.0);
+  pcl::PointCloud<pcl::PointXYZ>::Ptr points(new pcl::PointCloud<pcl::PointXYZ>);
+  pcl::PointCloud<pcl::Normal>::Ptr normals(new pcl::PointCloud<pcl::Normal>);
+  for (const std::size_t i : ours.points) {
+    const Eigen::Vector3f& p = cloud.point(i);
+    const Eigen::Vector3f n = cloud.normal(i).dot(p) > 0.f ? Eigen::Vector3f(-cloud.normal(i)) : cloud.normal(i);
+    points->emplace_back(p.x(), p.y(), p.z());
+    normals->emplace_back(n.x(), n.y(), n.z());
+  }
+  pcl::FPFHEstimation<pcl::PointXYZ, pcl::Normal, pcl::FPFHSignature33> estimation;
+  estimation.setInputCloud(points);
+  estimation.setInputNormals(normals);
+  estimation.setSearchMethod(pcl::search::KdTree<pcl::PointXYZ>::Ptr(new pcl::search::KdTree<pcl::PointXYZ>));
+  estimation.setRadiusSearch(3.0);
+  pcl::PointCloud<pcl::FPFHSignature33> theirs;
+  estimation.compute(theirs);
+  ASSERT_EQ(theirs.size(), ours.points.size());
+  std::vector<float> cosines;
+  for (std::size_t i = 0; i < theirs.size(); ++i) {
+    const Eigen::Map<const Eigen::Matrix<float, 33, 1>> other(theirs[i].histogram);
+    const auto own = ours.values.col(static_cast<Eigen::Index>(i));
+    if (other.allFinite() && other.norm() > 0.f && own.norm() > 0.f)
+      cosines.push_back(own.dot(other) / (own.norm() * other.norm()));
+  }
+  ASSERT_GT(cosines.size(), 300u);
+  std::nth_element(cosines.begin(), cosines.begin() + static_cast<std::ptrdiff_t>(cosines.size() / 2), cosines.end());
+  EXPECT_GT(cosines[cosines.size() / 2], 0.9f);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
+#define XXH_INLINE_ALL  // whoever links this library needs no other
 #include <xxhash.h>
 
 #include <revisit/retrieval/internal/place_store.hpp>
