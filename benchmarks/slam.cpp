@@ -39,7 +39,7 @@ void odometry_alone(benchmark::State& state) {
     Odometry odometry;
     for (Scan scan : all) {
       filter_range(scan, {});
-      benchmark::DoNotOptimize(odometry.follow(std::move(scan)));
+      benchmark::DoNotOptimize(odometry.follow(scan));
       ++done;
     }
   }

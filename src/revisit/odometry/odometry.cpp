@@ -18,13 +18,13 @@ struct Following {
 
 }  // namespace
 
-OdometryStep Odometry::follow(Scan scan, const std::optional<Pose>& T_external_lidar) {
+OdometryStep Odometry::follow(const Scan& scan, const std::optional<Pose>& T_external_lidar) {
   const bool is_late = !has_last_ || scan.stamp_s > last_stamp_s_;
   const double stamp_s = is_late ? scan.stamp_s : last_stamp_s_ + Following::kTypicalPeriod_s;
   const auto T_previous_lidar = motion_by_external(T_external_lidar);
   const bool follows_closely = follows(stamp_s);
-  OdometryStep step = source_ == Source::kExternal ? take(std::move(scan), stamp_s, T_previous_lidar)
-                                                   : match(std::move(scan), stamp_s, T_previous_lidar);
+  OdometryStep step =
+      source_ == Source::kExternal ? take(scan, stamp_s, T_previous_lidar) : match(scan, stamp_s, T_previous_lidar);
   step.stamp_s = stamp_s;
   step.stamp_was_replaced = !is_late;
   step.is_connected = step.is_tracked && follows_closely && untracked_ == 0;
@@ -53,60 +53,55 @@ std::optional<Pose> Odometry::motion_by_external(const std::optional<Pose>& T_ex
   return normalised(T_odom_last_.inverse() * T_odom_at_external_ * (T_external_last_->inverse() * *T_external_lidar));
 }
 
-OdometryStep Odometry::take(Scan scan, double stamp_s, const std::optional<Pose>& T_previous_lidar) const {
+OdometryStep Odometry::take(const Scan& scan, double stamp_s, const std::optional<Pose>& T_previous_lidar) const {
   OdometryStep step;
   step.is_tracked = T_previous_lidar.has_value() || !has_last_;
   step.T_previous_lidar = T_previous_lidar.value_or(Pose::Identity());
   step.T_odom_lidar = normalised(T_odom_last_ * step.T_previous_lidar);
   if (T_previous_lidar && follows(stamp_s)) step.motion = twist_of(*T_previous_lidar, stamp_s - last_stamp_s_);
-  if (step.motion) undistort(scan, *step.motion);
-  step.compensated = std::move(scan);
+  if (step.motion && !scan.times_s.empty()) step.compensated = compensated(scan, *step.motion);
   return step;
 }
 
-OdometryStep Odometry::match(Scan scan, double stamp_s, const std::optional<Pose>& T_previous_lidar) {
+OdometryStep Odometry::match(const Scan& scan, double stamp_s, const std::optional<Pose>& T_previous_lidar) {
   const bool is_swept = !scan.times_s.empty() && follows(stamp_s);
   OdometryStep step;
   step.motion = T_previous_lidar && follows(stamp_s) ? twist_of(*T_previous_lidar, stamp_s - last_stamp_s_)
                                                      : matcher_.predicted_motion(stamp_s);
-  const Scan raw = is_swept ? scan : Scan{};
   if (step.motion && is_swept) {
-    undistort(scan, *step.motion);
+    step.compensated = compensated(scan, *step.motion);
     if (first_scan_) begin_map_again(*step.motion);
   }
-  MatcherScan thinned = matcher_.thinned(scan.points);
+  MatcherScan thinned = matcher_.thinned(step.compensated.empty() ? scan.points : step.compensated);
   ScanMatch match = matcher_.match(stamp_s, thinned, T_previous_lidar);
   if (is_swept && match.prediction_error_m > Following::kWrong_m) {
     const Twist found = twist_of(match.T_previous_found, stamp_s - last_stamp_s_);
-    Scan again = raw;
-    undistort(again, found);
+    std::vector<Point> again = compensated(scan, found);
     if (first_scan_) begin_map_again(found);
-    MatcherScan thinned_again = matcher_.thinned(again.points);
-    const ScanMatch matched_again = matcher_.match(stamp_s, thinned_again, match.T_previous_found);
+    MatcherScan thinned_again = matcher_.thinned(again);
+    const ScanMatch matched_again = matcher_.match_again(stamp_s, thinned_again, match);
     if (matched_again.is_tracked) {
       match = matched_again;
       step.motion = found;
-      scan = std::move(again);
+      step.compensated = std::move(again);
       thinned = std::move(thinned_again);
     }
   }
   first_scan_.reset();
-  if (matcher_.map() == nullptr && !step.motion) first_scan_ = scan;
+  if (!matcher_.has_map() && !step.motion && !scan.times_s.empty()) first_scan_ = scan;
   matcher_.accept(stamp_s, thinned, match);
   step.T_odom_lidar = match.T_odom_lidar;
   step.T_previous_lidar = match.T_previous_lidar;
   step.information = match.information;
   step.is_tracked = match.is_tracked;
-  step.compensated = std::move(scan);
   return step;
 }
 
 // The first scan entered the map as it was swept: now that the motion is known, it enters it as it would have been seen
 // at its stamp.
 void Odometry::begin_map_again(const Twist& motion) {
-  undistort(*first_scan_, motion);
   matcher_.restart();
-  restore_map(last_stamp_s_, first_scan_->points, T_odom_last_);
+  restore_map(last_stamp_s_, compensated(*first_scan_, motion), T_odom_last_);
   first_scan_.reset();
 }
 

@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include <revisit/core/pose.hpp>
 #include <revisit/core/scan.hpp>
@@ -23,7 +25,8 @@ struct OdometryStep {
   bool lost = false;                         ///< tracking ended with this scan: the next one begins a new segment
   bool stamp_was_replaced = false;           ///< it was not after that of the scan before
   int segment = 0;                           ///< of the trajectory; between two segments tracking was lost
-  Scan compensated;                          ///< the scan as it would have been seen at its stamp
+  /// The points as they would have been seen at the stamp; empty where these are the scan's own.
+  std::vector<Point> compensated;
 };
 
 /// Follows the sensor from scan to scan: the one odometry of detection, SLAM and calibration. Compensates the motion
@@ -35,10 +38,11 @@ class Odometry {
     kLidar,    ///< scans are matched; a pose that comes with them is a first guess (wheels)
     kExternal  ///< the poses that come with the scans are taken as they are
   };
-  explicit Odometry(Source source = Source::kLidar) : source_(source) {}
+  explicit Odometry(Source source = Source::kLidar, const ScanMatcher::Resolution& resolution = ScanMatcher::kFine)
+      : source_(source), matcher_(resolution) {}
 
   /// `T_external_lidar`: the pose from wheels or another odometry, in any frame of its own; it may slip and drift.
-  OdometryStep follow(Scan scan, const std::optional<Pose>& T_external_lidar = std::nullopt);
+  OdometryStep follow(const Scan& scan, const std::optional<Pose>& T_external_lidar = std::nullopt);
 
   /// A scan of an earlier run enters the map of what was seen lately: its points in its own frame, and its pose.
   void restore_map(double stamp_s, std::span<const Point> points, const Pose& T_odom_lidar);
@@ -48,8 +52,8 @@ class Odometry {
   void restore_external(const Pose& T_external_lidar);
 
  private:
-  OdometryStep match(Scan scan, double stamp_s, const std::optional<Pose>& T_previous_lidar);
-  OdometryStep take(Scan scan, double stamp_s, const std::optional<Pose>& T_previous_lidar) const;
+  OdometryStep match(const Scan& scan, double stamp_s, const std::optional<Pose>& T_previous_lidar);
+  OdometryStep take(const Scan& scan, double stamp_s, const std::optional<Pose>& T_previous_lidar) const;
   std::optional<Pose> motion_by_external(const std::optional<Pose>& T_external_lidar) const;
   bool follows(double stamp_s) const;
   void begin_map_again(const Twist& motion);

@@ -52,8 +52,8 @@ TEST(Odometry, CompensatesTheSweepItFollows) {
   const Scan still = swept_scan(14, false);
   double worst_m = 0.0;
   for (std::size_t k = 0; k < still.points.size(); k += 50)
-    worst_m = std::max(worst_m, static_cast<double>(std::hypot(still.points[k].x - step.compensated.points[k].x,
-                                                               still.points[k].y - step.compensated.points[k].y)));
+    worst_m = std::max(worst_m, static_cast<double>(std::hypot(still.points[k].x - step.compensated[k].x,
+                                                               still.points[k].y - step.compensated[k].y)));
   EXPECT_LT(worst_m, 0.1);
 }
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include <oneapi/tbb/task_group.h>
+
 #include <revisit/registration/icp.hpp>
 #include <revisit/registration/surface_cloud.hpp>
 
@@ -14,7 +16,6 @@ namespace {
 // Chosen on simulated drives and KITTI raw 0005 (docs/slam.md, docs/history.md).
 struct Matching {
   static constexpr double kPointsAlongAVoxel = 2.0;  ///< that the map is given
-  static constexpr double kVoxelsToTheMedian = 12.0, kSmallestVoxel_m = 0.25, kLargestVoxel_m = 1.0;
   static constexpr double kMapReach_m = 100.0;
   static constexpr float kForgetEvery_m = 5.f;  ///< what lies beyond the reach
   static constexpr double kNewShare = 0.1;      ///< of the newest scan in a running mean
@@ -57,6 +58,20 @@ std::vector<Eigen::Vector3f> in_map(const std::vector<Eigen::Vector3f>& points, 
 
 }  // namespace
 
+struct ScanMatcher::Insertion {
+  tbb::task_group tasks;
+  ~Insertion() { tasks.wait(); }
+  Insertion() = default;
+  Insertion(const Insertion&) = delete;
+  Insertion& operator=(const Insertion&) = delete;
+};
+
+ScanMatcher::ScanMatcher(const Resolution& resolution)
+    : resolution_(resolution), insertion_(std::make_unique<Insertion>()) {}
+ScanMatcher::~ScanMatcher() = default;
+ScanMatcher::ScanMatcher(ScanMatcher&&) noexcept = default;
+ScanMatcher& ScanMatcher::operator=(ScanMatcher&&) noexcept = default;
+
 std::optional<Twist> ScanMatcher::predicted_motion(double stamp_s) const {
   const double gap_s = stamp_s - last_stamp_s_;
   return gap_s > 0.0 && gap_s <= Matching::kLongestGap_s ? motion_ : std::nullopt;
@@ -66,8 +81,8 @@ MatcherScan ScanMatcher::thinned(std::span<const Point> points) const {
   MatcherScan scan;
   scan.range_m = map_ ? range_m_ : median_range_m(points);
   scan.voxel_m = map_ ? map_->voxel_m()
-                      : std::clamp(scan.range_m / Matching::kVoxelsToTheMedian, Matching::kSmallestVoxel_m,
-                                   Matching::kLargestVoxel_m);
+                      : std::clamp(scan.range_m / resolution_.voxels_to_the_median, resolution_.smallest_voxel_m,
+                                   resolution_.largest_voxel_m);
   scan.map_points = thin_surfaces(points, {}, scan.voxel_m / Matching::kPointsAlongAVoxel).points;
   std::vector<Point> thinned_once;
   thinned_once.reserve(scan.map_points.size());
@@ -75,6 +90,8 @@ MatcherScan ScanMatcher::thinned(std::span<const Point> points) const {
   scan.points = thin_surfaces(thinned_once, {}, scan.voxel_m).points;
   return scan;
 }
+
+double ScanMatcher::fine_m() const { return Matching::kFineVoxels * map_->voxel_m() + Matching::kFine_m; }
 
 double ScanMatcher::search_radius_m() const {
   if (scans_ < Matching::kScansToLearn) return Matching::kFarSearch_m;
@@ -90,32 +107,42 @@ bool ScanMatcher::is_credible(double matched, double met) const {
 
 ScanMatch ScanMatcher::match(double stamp_s, const MatcherScan& scan,
                              const std::optional<Pose>& T_previous_lidar) const {
-  ScanMatch match;
   const double gap_s = stamp_s - last_stamp_s_;
   const bool extrapolates = motion_ && gap_s > 0.0 && gap_s <= Matching::kLongestExtrapolation_s;
   const Pose T_predicted = T_previous_lidar ? *T_previous_lidar
                            : extrapolates   ? motion_after(*motion_, gap_s)
                                             : Pose::Identity();
+  return match_within(map_ ? search_radius_m() : 0.0, stamp_s, scan, T_predicted);
+}
+
+ScanMatch ScanMatcher::match_again(double stamp_s, const MatcherScan& scan, const ScanMatch& match) const {
+  return match_within(map_ ? fine_m() : 0.0, stamp_s, scan, match.T_previous_found);
+}
+
+ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const MatcherScan& scan,
+                                    const Pose& T_predicted) const {
+  ScanMatch match;
   match.T_previous_lidar = match.T_previous_found = T_predicted;
   match.T_odom_lidar = normalised(T_odom_lidar_ * T_predicted);
   if (!map_) {
     match.is_tracked = true;  // the map begins wherever it is
     return match;
   }
-  const double voxel_m = map_->voxel_m();
-  const auto align = [&](double radius_m, const Pose& T_guess) {
+  insertion_->tasks.wait();
+  const auto align = [&](double width_m, const Pose& T_guess) {
     IcpResult icp = align_icp(*map_, scan.points, T_odom_lidar_ * T_guess,
-                              {.coarse_m = radius_m,
-                               .fine_m = std::min(radius_m, Matching::kFineVoxels * voxel_m + Matching::kFine_m),
-                               .least_reach_m = voxel_m,
+                              {.coarse_m = width_m,
+                               .fine_m = std::min(width_m, fine_m()),
+                               .least_reach_m = map_->voxel_m(),
                                .settled_m = Matching::kSettled_m,
                                .least_seen = Matching::kLeastSeen});
     icp.converged = icp.converged || (icp.information(0, 0) > 0.0 && icp.last_step_m < Matching::kSteady_m);
     return icp;
   };
   const auto fits = [&](const IcpResult& icp) { return icp.converged && is_credible(icp.matched, icp.met); };
-  IcpResult icp = align(search_radius_m(), T_predicted);
+  IcpResult icp = align(radius_m, T_predicted);
   // A turn or a jolt that was not predicted, or the end of one. After a gap anything may fit somehow: nothing is tried.
+  const double gap_s = stamp_s - last_stamp_s_;
   const bool follows = gap_s > 0.0 && gap_s <= Matching::kLongestGap_s;
   for (const double turn_deg : Matching::kTurnsTried_deg)
     for (const Pose& T_guess : {T_predicted, Pose(Pose::Identity())}) {
@@ -141,7 +168,7 @@ void ScanMatcher::accept(double stamp_s, const MatcherScan& scan, const ScanMatc
   const double gap_s = stamp_s - last_stamp_s_;
   if (!map_) {
     range_m_ = scan.range_m;
-    map_.emplace(scan.voxel_m, Matching::kMapReach_m);
+    map_ = std::make_unique<LocalMap>(scan.voxel_m, Matching::kMapReach_m);
   } else {
     const double share = std::max(Matching::kNewShare, 1.0 / scans_);
     if (match.is_tracked) {
@@ -153,17 +180,22 @@ void ScanMatcher::accept(double stamp_s, const MatcherScan& scan, const ScanMatc
     if (gap_s > 0.0 && gap_s <= Matching::kLongestGap_s) motion_ = twist_of(match.T_previous_lidar, gap_s);
   }
   T_odom_lidar_ = match.T_odom_lidar;
-  if (match.is_tracked) map_->add(in_map(scan.map_points, T_odom_lidar_));
-  if (const Eigen::Vector3f here = T_odom_lidar_.translation().cast<float>();
-      (here - forgotten_from_).norm() > Matching::kForgetEvery_m) {
-    map_->forget_far_from(here);
-    forgotten_from_ = here;
-  }
+  const Eigen::Vector3f here = T_odom_lidar_.translation().cast<float>();
+  const bool forgets = (here - forgotten_from_).norm() > Matching::kForgetEvery_m;
+  if (forgets) forgotten_from_ = here;
+  insertion_->tasks.wait();
+  insertion_->tasks.run(
+      [map = map_.get(), forgets, here,
+       points = match.is_tracked ? in_map(scan.map_points, T_odom_lidar_) : std::vector<Eigen::Vector3f>()] {
+        map->add(points);
+        if (forgets) map->forget_far_from(here);
+      });
   last_stamp_s_ = stamp_s;
   ++scans_;
 }
 
 void ScanMatcher::restart() {
+  insertion_->tasks.wait();
   map_.reset();
   motion_.reset();
   squared_prediction_error_m2_ = typical_match_ = 0.0;

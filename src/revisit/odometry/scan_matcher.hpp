@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -36,6 +37,17 @@ struct ScanMatch {
 /// in the order of their stamps. Belongs to one thread at a time; deterministic, whatever the number of threads.
 class ScanMatcher {
  public:
+  /// How fine the map is: voxels to the median range, and the bounds of their edge.
+  struct Resolution {
+    double voxels_to_the_median, smallest_voxel_m, largest_voxel_m;
+  };
+  static constexpr Resolution kFine{12.0, 0.25, 1.0};   ///< for a trajectory: drift counts over kilometres
+  static constexpr Resolution kCoarse{4.0, 0.75, 1.5};  ///< for detection: sweeps, and motions over some 30 m
+  explicit ScanMatcher(const Resolution& resolution = kFine);
+  ~ScanMatcher();
+  ScanMatcher(ScanMatcher&&) noexcept;
+  ScanMatcher& operator=(ScanMatcher&&) noexcept;
+
   /// The predicted motion during the coming scan, where it follows closely on the last.
   std::optional<Twist> predicted_motion(double stamp_s) const;
 
@@ -44,7 +56,9 @@ class ScanMatcher {
   /// Matches the scan with the map. `T_previous_lidar`, if there is one, is the motion since the scan before as wheels
   /// or another odometry measured it: the guess, and the answer where the map gives none.
   ScanMatch match(double stamp_s, const MatcherScan& scan, const std::optional<Pose>& T_previous_lidar = {}) const;
-  /// Goes on from there: the scan enters the map.
+  /// Matches a scan that was found at `match` once more, after its sweep was compensated with the motion found there.
+  ScanMatch match_again(double stamp_s, const MatcherScan& scan, const ScanMatch& match) const;
+  /// Goes on from there: the scan enters the map, in the background.
   void accept(double stamp_s, const MatcherScan& scan, const ScanMatch& match);
 
   /// Forgets what was seen: the next scan begins a map where it is predicted to be.
@@ -52,13 +66,18 @@ class ScanMatcher {
   /// Goes on from this pose, with the motion since the scan before, if it is known.
   void restore(double stamp_s, const Pose& T_odom_lidar, const std::optional<Twist>& motion);
 
-  const LocalMap* map() const { return map_ ? &*map_ : nullptr; }
+  bool has_map() const { return map_ != nullptr; }
 
  private:
+  struct Insertion;
+  ScanMatch match_within(double radius_m, double stamp_s, const MatcherScan& scan, const Pose& T_predicted) const;
+  double fine_m() const;
   double search_radius_m() const;
   bool is_credible(double matched, double met) const;
 
-  std::optional<LocalMap> map_;
+  Resolution resolution_;
+  std::unique_ptr<LocalMap> map_;
+  std::unique_ptr<Insertion> insertion_;  ///< of the last scan into the map; waited for before the map is read
   Pose T_odom_lidar_ = Pose::Identity();
   std::optional<Twist> motion_;
   Eigen::Vector3f forgotten_from_ = Eigen::Vector3f::Zero();  ///< where the map was last cut to its reach

@@ -43,7 +43,7 @@ Result<CalibrationReport> calibrate_recording(const Recording& recording, const 
     if (!has_poses) {
       OdometryStep step = odometry.follow(*scan);
       if (!step.is_tracked) continue;
-      *scan = std::move(step.compensated);
+      if (!step.compensated.empty()) scan->points = std::move(step.compensated);
       T_world_lidar = step.T_odom_lidar;
       T_world_lidar->translation().x() += kSegmentsApart_m * step.segment;
     }

@@ -11,6 +11,7 @@ namespace revisit {
 LoopDetector::LoopDetector(const Parameters& parameters, const std::optional<IntensityScale>& scale,
                            IntensityCalibration calibration, LogSink log)
     : parameters_(require_valid(parameters)),
+      odometry_(Odometry::Source::kLidar, ScanMatcher::kCoarse),
       preparation_(parameters, scale, std::move(calibration), std::move(log)),
       recognition_(parameters, clouds_in_memory()) {}
 

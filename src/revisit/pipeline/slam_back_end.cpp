@@ -4,6 +4,8 @@
 #include <string>
 #include <utility>
 
+#include <oneapi/tbb/parallel_invoke.h>
+
 #include <revisit/core/stopwatch.hpp>
 #include <revisit/pose_graph/edge_information.hpp>
 #include <revisit/store/keyframe_bytes.hpp>
@@ -42,7 +44,14 @@ Result<SlamBackEnd::Added> SlamBackEnd::add_keyframe(PreparedScan scan, const Od
                                                                              .T_segment_lidar = odometry.T_odom_lidar}
                                                            : graph_.last_point().to(odometry.T_odom_lidar);
   scan.trajectory_point = point;
-  auto detection = find_loop(scan, starts_segment, sensor);
+  // The cloud is thinned for the map meanwhile, for nothing where the place turns out to be known.
+  Result<Detection> detection = Error{};
+  Bytes map_cloud;
+  tbb::parallel_invoke(
+      [&] { detection = find_loop(scan, starts_segment, sensor); },
+      [&] {
+        map_cloud = to_map_bytes(thin_surfaces(scan.scan.points, scan.ground.is_ground, parameters_.slam.map_voxel_m));
+      });
   added.detect_ms = watch.lap_ms();
 
   std::optional<StoredEdge> edge;
@@ -62,7 +71,13 @@ Result<SlamBackEnd::Added> SlamBackEnd::add_keyframe(PreparedScan scan, const Od
   for (LoopGate::Decision& decision : graph_.decide_overdue()) decisions.push_back(std::move(decision));
   added.graph_ms = watch.lap_ms();
 
-  Status stored = store_->add(stored_form(scan, starts_segment, is_known_place));
+  StoredKeyframe keyframe{frame, scan.scan.stamp_s, odometry.T_odom_lidar, starts_segment, {}, {}, {}};
+  if (!is_known_place) {
+    keyframe.descriptor = to_bytes(scan.descriptor);
+    keyframe.place = to_bytes(scan.cloud);
+    keyframe.cloud = std::move(map_cloud);
+  }
+  Status stored = store_->add(keyframe);
   if (stored && edge) stored = store_->add(*edge);
   if (stored && detection && detection->searchable_places > 0) stored = store_->add(detection->row());
   if (stored) stored = write_sensor_facts(*store_, sensor);
@@ -97,20 +112,6 @@ KeyframeGraph::OdometryEdge SlamBackEnd::edge_to(const TrajectoryPoint& point, c
   if (point.segment != last.segment) return {T_last_new, no_information()};
   return {T_last_new, source_ == Odometry::Source::kExternal ? external_odometry_information(T_last_new)
                                                              : odometry_information(T_last_new, information)};
-}
-
-StoredKeyframe SlamBackEnd::stored_form(const PreparedScan& keyframe, bool starts_segment, bool is_known_place) const {
-  StoredKeyframe stored;
-  stored.frame = keyframe.scan.frame;
-  stored.stamp_s = keyframe.scan.stamp_s;
-  stored.T_odom_lidar = keyframe.trajectory_point->T_segment_lidar;
-  stored.starts_segment = starts_segment;
-  if (is_known_place) return stored;
-  stored.descriptor = to_bytes(keyframe.descriptor);
-  stored.place = to_bytes(keyframe.cloud);
-  stored.cloud =
-      to_map_bytes(thin_surfaces(keyframe.scan.points, keyframe.ground.is_ground, parameters_.slam.map_voxel_m));
-  return stored;
 }
 
 Status SlamBackEnd::enter(const std::vector<LoopGate::Decision>& decisions, std::size_t& entered) {

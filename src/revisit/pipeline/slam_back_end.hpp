@@ -36,7 +36,6 @@ class SlamBackEnd {
  private:
   Result<Detection> find_loop(const PreparedScan& keyframe, bool starts_segment, const SensorFacts& sensor);
   KeyframeGraph::OdometryEdge edge_to(const TrajectoryPoint& point, const Matrix6& information) const;
-  StoredKeyframe stored_form(const PreparedScan& keyframe, bool starts_segment, bool is_known_place) const;
   Status enter(const std::vector<LoopGate::Decision>& decisions, std::size_t& entered);
 
   Parameters parameters_;

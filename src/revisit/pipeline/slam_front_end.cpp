@@ -39,9 +39,10 @@ Result<SlamFrontEnd::Step> SlamFrontEnd::step(Scan scan, const std::optional<Pos
   report(scan.frame, odometry);
 
   step.starts_segment = keyframe_segment_ && odometry.segment != *keyframe_segment_;
-  const bool is_keyframe =
-      !keyframe_segment_ || step.starts_segment ||
-      (odometry.is_tracked && selection_.is_keyframe(odometry.T_odom_lidar, odometry.compensated.points));
+  const bool is_keyframe = !keyframe_segment_ || step.starts_segment ||
+                           (odometry.is_tracked &&
+                            selection_.is_keyframe(odometry.T_odom_lidar,
+                                                   odometry.compensated.empty() ? scan.points : odometry.compensated));
   if (!is_keyframe && !makes_a_pair(odometry)) {
     previous_.reset();
     return step;

@@ -5,13 +5,15 @@
 #include <cmath>
 
 #include <revisit/registration/agreement.hpp>
+#include <revisit/registration/icp.hpp>
 #include <revisit/verification/geometric.hpp>
 
 namespace revisit {
 namespace {
 
 struct Typical {
-  static constexpr double kStill_m = 0.05;          ///< from the same spot, intensities would agree too well
+  static constexpr double kCoarse_m = 1.0, kSettled_m = 2e-3;  ///< of the registration of two scans in a row
+  static constexpr double kStill_m = 0.05;                     ///< from the same spot, intensities would agree too well
   static constexpr double kNewShare = 0.3;          ///< of the newest pair in the running mean of inlier ratios
   static constexpr double kFewestInliers = 0.4;     ///< of a worse pair, odometry was wrong
   static constexpr std::size_t kFewestPairs = 10;   ///< before, the defaults are better
@@ -22,8 +24,11 @@ struct Typical {
 
 bool TypicalAgreementEstimate::add(const ScanGeometry& previous, const ScanGeometry& current,
                                    const Pose& T_previous_current) {
+  // As well as they can agree: where odometry is off by a little, as in a turn on the spot, that is not the sensor's.
+  const IcpResult icp = align_icp(previous.surface(), current.surface().points(), T_previous_current,
+                                  {.coarse_m = Typical::kCoarse_m, .settled_m = Typical::kSettled_m});
   const Agreement agreement =
-      measure_agreement(previous.surface(), current.surface(), T_previous_current, LearntWith::kInlierDistance_m);
+      measure_agreement(previous.surface(), current.surface(), icp.T_target_source, LearntWith::kInlierDistance_m);
   if (agreement.inlier_ratio < Typical::kFewestInliers) return false;
   if (agreement.intensity_correlation && T_previous_current.translation().norm() > Typical::kStill_m)
     add_correlation(*agreement.intensity_correlation, 1);
