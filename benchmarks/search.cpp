@@ -28,7 +28,7 @@ struct Grid {
   std::unique_ptr<PlaceStore> store = std::make_unique<PlaceStore>();
 
   explicit Grid(const DescriptorOptions& grid) : options(grid), places(grid) {}
-  // Places are added as ever larger maps are asked for; a smaller one is the beginning of a larger.
+  // Places are added as ever larger maps are measured; a smaller one is the beginning of a larger.
   const PlaceStore& with(std::size_t count) {
     for (std::size_t i = store->size(); i < count; ++i)
       store->add(FrameId{static_cast<std::int64_t>(i)}, 0.1 * static_cast<double>(i), places.place(i));
@@ -91,7 +91,7 @@ void scalar_search(benchmark::State& state, int rings) {
   }
 }
 
-// Another index's search; how often it finds what the exact search finds is told beside its time.
+// Another index's search; how often it finds what the exact search finds stands beside its time.
 template <typename Other>
 void other_search(benchmark::State& state, int rings) {
   const auto count = static_cast<std::size_t>(state.range(0)), k = static_cast<std::size_t>(state.range(1));

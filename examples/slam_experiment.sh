@@ -16,7 +16,7 @@ run() {  # NAME TOML [OPTION ...]
   local name=$1 spec=$2
   shift 2
   echo "== $name"
-  # 3: done, but with scans skipped or not tracked, which the output tells.
+  # 3: done, but with scans skipped or not tracked, which the output names.
   build/revisit slam "$spec" --out "$out/$name" --overwrite "$@" || [ $? -eq 3 ]
   build/revisit evaluate "$out/$name" --reference "$spec" > "$out/$name.txt"
   { echo "$name"; sed -n '/^Table 3/,/^$/p' "$out/$name.txt" | tail -n +2; } >> "$out/table.txt"

@@ -33,9 +33,8 @@ without "nothing" "$drive"
 without "layers of height (one image of 20 x 60)" "$drive" --descriptor.levels 0 --descriptor.sectors 60
 without "the ground, from the descriptor" "$drive" --preprocess.remove_ground true
 without "intensity in retrieval" "$drive" --retrieval.intensity_weight 0
-without "candidates spread over places" "$drive" --retrieval.separation_frames 0
 without "the search from overhead" "$drive" --geometric.overhead_search false
 without "a second and third candidate" "$drive" --geometric.candidates 1
-without "following" "$drive" --geometric.follow false
+without "loop following" "$drive" --geometric.follow false
 without "intensity, everywhere" "$drive" --intensity.full_scale 1e9
 without "undoing the sweep" "$out/no_times"

@@ -8,7 +8,8 @@ for package in $wanted; do
   [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)" = installed ] || missing+=("$package")
 done
 [ ${#missing[@]} -eq 0 ] && exit 0
-echo "installing: ${missing[*]}"
+echo "These Debian packages are missing and will be installed (list: scripts/packages.txt):"
+printf '  %s\n' "${missing[@]}"
 as_root=()
 if [ "$(id -u)" -ne 0 ]; then
   command -v sudo >/dev/null || { echo "not root, and no sudo: install these packages, then run make again" >&2; exit 1; }

@@ -19,7 +19,7 @@ def main():
     if len(sys.argv) < 2:
         sys.exit(__doc__)
     for kind in ("same direction", "reverse"):
-        asked, found = np.zeros(len(BORDERS_M)), np.zeros(len(BORDERS_M))
+        queries, found = np.zeros(len(BORDERS_M)), np.zeros(len(BORDERS_M))
         for folder in map(pathlib.Path, sys.argv[1:]):
             poses = np.loadtxt(folder / "poses.tum")
             xyz, (qx, qy, qz, qw) = poses[:, 1:4], poses[:, 4:].T
@@ -33,10 +33,10 @@ def main():
                 is_reverse = ahead[query] @ ahead[nearest] < 0.0
                 at = int(np.searchsorted(BORDERS_M, away[nearest], side="right")) - 1
                 if is_reverse == (kind == "reverse"):
-                    asked[at] += 1
+                    queries[at] += 1
                     found[at] += query in loops
-        cells = [f"{BORDERS_M[i]:.0f} to {BORDERS_M[i + 1]:.0f} m: {found[i]:.0f} of {asked[i]:.0f}"
-                 for i in range(len(BORDERS_M) - 1) if asked[i]]
+        cells = [f"{BORDERS_M[i]:.0f} to {BORDERS_M[i + 1]:.0f} m: {found[i]:.0f} of {queries[i]:.0f}"
+                 for i in range(len(BORDERS_M) - 1) if queries[i]]
         print(f"{kind}: " + "; ".join(cells))
 
 

@@ -100,7 +100,7 @@ void use_frames_alone_without_times(const Recording& recording, Parameters& para
 
 Stamps stamps_of(const Recording& recording) {
   Stamps stamps;
-  for (std::size_t i = 0; i < recording.size(); ++i) stamps.emplace_back(recording.frame(i), recording.stamp_s(i));
+  for (std::size_t i = 0; i < recording.size(); ++i) stamps.push_back({recording.frame(i), recording.stamp_s(i)});
   return stamps;
 }
 

@@ -19,7 +19,7 @@
 
 namespace revisit::cli {
 
-/// What the program returns to the shell; told in --help.
+/// What the program returns to the shell; listed in --help.
 enum ExitCode : int {
   kDone = 0,
   kFailed = 1,
@@ -63,8 +63,8 @@ Result<std::unique_ptr<Recording>> open_input(const std::string& input, const st
 /// What stands for the exclusion of the recent past where the recording has no times: frames alone; said once.
 void use_frames_alone_without_times(const Recording& recording, Parameters& parameters);
 
-/// Frame and time of each scan, s.
-using Stamps = std::vector<std::pair<FrameId, double>>;
+/// Frame and time of each scan.
+using Stamps = std::vector<FrameTime>;
 Stamps stamps_of(const Recording& recording);
 
 /// The calibration in `file`, or the identity where no file was named.
@@ -72,10 +72,10 @@ Result<IntensityCalibration> load_calibration(const std::string& file);
 
 /// Prints to standard error, with the level; the program's LogSink.
 LogSink print_log();
-/// Prints the error and what the shell is told.
+/// Prints the error; returns the exit code.
 int fail(const Error& error, int code = kFailed);
 
-/// Why the file cannot be the output of a command: another ending than `extension` (if one is asked for), or a folder
+/// Why the file cannot be the output of a command: another ending than `extension` (if one is required), or a folder
 /// that does not exist.
 Status check_output(const std::string& file, const std::string& extension);
 

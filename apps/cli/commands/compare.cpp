@@ -74,7 +74,9 @@ Result<std::vector<Method>> make_methods(const CompareOptions& options, const Pa
   }
   for (Method& method : methods) {
     method.report.gives_poses = method.detector != nullptr;
-    auto writer = ResultWriter::create(fs::path(options.out) / method.report.name, options.overwrite);
+    auto writer =
+        ResultWriter::create(fs::path(options.out) / method.report.name,
+                             options.overwrite ? ResultWriter::Existing::kReplace : ResultWriter::Existing::kRefuse);
     if (!writer) return writer.error();
     method.writer = *std::move(writer);
   }

@@ -201,7 +201,8 @@ int detect(const DetectOptions& options) {
   if (!scale->warning.empty())
     print_log()(LogLevel::kWarning, (database->recording ? options.database : options.input) + ": " + scale->warning);
 
-  auto writer = ResultWriter::create(options.out, options.overwrite);
+  auto writer = ResultWriter::create(
+      options.out, options.overwrite ? ResultWriter::Existing::kReplace : ResultWriter::Existing::kRefuse);
   if (!writer) return fail(writer.error());
   const std::filesystem::path out = options.out;
   if (const Status status = write_poses(out, **recording); !status) return fail(status.error());

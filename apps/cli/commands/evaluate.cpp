@@ -101,9 +101,9 @@ Result<JudgedTrajectory> judge(const fs::path& file, const Trajectory& reference
     if (!store) return store.error();
     const auto scans = store->scans();
     if (!scans) return scans.error();
-    for (const StoredScan& scan : *scans) stamps.emplace_back(scan.frame, scan.stamp_s);
+    for (const StoredScan& scan : *scans) stamps.push_back({scan.frame, scan.stamp_s});
   } else {
-    for (const auto& [frame, entry] : reference.entries) stamps.emplace_back(frame, entry.stamp_s);
+    for (const auto& [frame, entry] : reference.entries) stamps.push_back({frame, entry.stamp_s});
   }
   JudgedTrajectory judged;
   judged.trajectory = to_trajectory(*poses, std::nullopt, stamps);

@@ -222,7 +222,8 @@ int slam(const SlamOptions& options) {
   if (!slam) return fail(slam.error());
 
   const fs::path out = options.out;
-  auto writer = ResultWriter::create(out, true);  // whether there was a map is decided above
+  auto writer =
+      ResultWriter::create(out, ResultWriter::Existing::kReplace);  // whether there was a map is decided above
   if (!writer) return fail(writer.error());
   listen_for_interrupt();
   Stopwatch watch;
@@ -263,7 +264,7 @@ Run add_slam(CLI::App& program) {
       "(formats: docs/formats.md):\n"
       "  poses.txt/.tum   the corrected trajectory\n"
       "  odometry.tum     the trajectory before any loop\n"
-      "  map.ply/.pcd     the map, without what moved; map.png shows it, tiles/ holds it in pieces\n"
+      "  map.ply/.pcd     the map, without what moved; map.png shows it, tiles/ holds it in tiles of 50 m\n"
       "  graph.g2o        the pose graph\n"
       "  loops.csv, candidates.csv, run.json   as `revisit detect` writes them, for key frames\n"
       "  map.sqlite       everything as it is found: an interrupted run continues with --resume\n\n"

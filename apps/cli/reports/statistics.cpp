@@ -67,7 +67,7 @@ Result<RecordingStatistics> collect_statistics(const Recording& recording, const
   double scans_with_rings = 0.0;
   for (std::size_t k = 0; k < wanted; ++k) {
     auto scan = recording.read(k * recording.size() / wanted);
-    if (!scan) continue;  // `info` has told of broken scans already
+    if (!scan) continue;  // `info` has named broken scans already
     ++result.scans;
     result.points += static_cast<double>(scan->points.size());
     const Rings rings = find_rings(*scan);

@@ -14,7 +14,7 @@ std::vector<std::int64_t> supported_instruction_sets();
 void force_instruction_set(std::int64_t target);
 /// Highway's name of the one that is chosen.
 const char* instruction_set_name();
-/// How many lanes of 64 bits its vectors have, asked of the running code itself.
+/// How many lanes of 64 bits its vectors have, as the running code has it.
 std::size_t instruction_set_lanes();
 
 }  // namespace revisit

@@ -83,7 +83,7 @@ struct Layout {
 
 void turn_images(const uint64_t* image, uint32_t cells, uint32_t rings, uint32_t sectors, const Layout& layout,
                  uint64_t* twice, uint64_t* turned) {
-  // The string of bits twice in a row: every turn is a piece of it.
+  // The string of bits twice in a row: every rotation is a part of it.
   std::memset(twice, 0, (2 * layout.words + 2) * sizeof(uint64_t));
   std::memcpy(twice, image, layout.words * sizeof(uint64_t));
   const size_t at = cells / 64;

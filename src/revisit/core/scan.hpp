@@ -18,6 +18,9 @@ struct Point {
 };
 static_assert(sizeof(Point) == 16, "the point loops read four floats at a time");
 
+/// Height of the ground where it is not known, in the frame of the sensor: one on the roof of a car (KITTI's).
+constexpr double kGroundBelowCarSensor_m = -1.73;
+
 /// One sweep of a LiDAR. `rings` and `times_s` are empty or hold one entry a point.
 struct Scan {
   FrameId frame;

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <string>
 
+#include <revisit/core/ids.hpp>
+
 namespace revisit {
 
 /// As printf, up to 255 characters.
@@ -16,5 +18,8 @@ namespace revisit {
   va_end(values);
   return text;
 }
+
+/// "frame 12", as messages name a scan.
+inline std::string to_text(FrameId frame) { return "frame " + std::to_string(frame.value); }
 
 }  // namespace revisit

@@ -57,9 +57,6 @@ struct LayerConstants {
   static constexpr int kFewestCells = 12;   ///< a scan with fewer occupied cells describes no place
 };
 
-/// Height of the ground where it is not known: a sensor on the roof of a car.
-constexpr double kDefaultGround_m = -1.73;
-
 /// The 8-bit form of an intensity in [0, 1]; values outside are cut, NaN is 0.
 std::uint8_t quantise_intensity(float intensity);
 
@@ -68,13 +65,14 @@ std::uint8_t quantise_intensity(float intensity);
 /// `ground_z_m`: where the ground below the sensor lies, in the sensor's frame; levels count from it.
 /// Throws std::invalid_argument where the grid is outside the allowed range. Safe to call from several threads.
 IntensityScanContext describe(std::span<const Point> points, const DescriptorOptions& options,
-                              double ground_z_m = kDefaultGround_m);
+                              double ground_z_m = kGroundBelowCarSensor_m);
 
 /// describe() into memory that is reused: allocates nothing from the second call on the same grid.
 class Describer {
  public:
   explicit Describer(const DescriptorOptions& options);
-  void describe(std::span<const Point> points, IntensityScanContext& result, double ground_z_m = kDefaultGround_m);
+  void describe(std::span<const Point> points, IntensityScanContext& result,
+                double ground_z_m = kGroundBelowCarSensor_m);
 
  private:
   DescriptorOptions options_;

@@ -58,7 +58,7 @@ double value_of(const PCLPointField& field, const std::uint8_t* record) {
 }
 
 // Drivers write the time of a point in seconds, micro- or nanoseconds, from the sweep's start or from an epoch. A sweep
-// lasts between a millisecond and two seconds, which tells the unit; anything else is no time.
+// lasts between a millisecond and two seconds, which gives the unit; anything else is no time.
 std::vector<float> to_sweep_times(const std::vector<double>& raw) {
   if (raw.empty() || !std::all_of(raw.begin(), raw.end(), [](double value) { return std::isfinite(value); })) return {};
   const auto [first, last] = std::minmax_element(raw.begin(), raw.end());

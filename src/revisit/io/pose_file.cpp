@@ -149,17 +149,17 @@ Result<PoseFile> read_poses(const std::filesystem::path& file) {
   return poses;
 }
 
-Result<std::vector<std::pair<double, Eigen::Vector3d>>> read_tum_positions(const std::filesystem::path& file) {
+Result<std::vector<TimedPosition>> read_tum_positions(const std::filesystem::path& file) {
   const auto rows = io_internal::read_number_rows(file);
   if (!rows) return rows.error();
-  std::vector<std::pair<double, Eigen::Vector3d>> positions;
+  std::vector<TimedPosition> positions;
   for (const NumberRow& row : *rows) {
     if (row.values.size() != 8)
       return bad_row(file, row.line, std::to_string(row.values.size()) + " numbers; allowed: 8 (TUM)");
     const Eigen::Vector3d position(row.values[1], row.values[2], row.values[3]);
     if (!std::isfinite(row.values[0]) || !position.allFinite())
       return bad_row(file, row.line, "a time or position is not finite");
-    positions.emplace_back(row.values[0], position);
+    positions.push_back({row.values[0], position});
   }
   if (positions.empty()) return Error{file.string() + ": holds no poses"};
   return positions;
@@ -208,10 +208,11 @@ Status write_g2o_poses(const std::filesystem::path& file, const Trajectory& traj
 }
 
 Trajectory to_trajectory(const PoseFile& poses, const std::optional<Pose>& T_camera_lidar,
-                         const std::vector<std::pair<FrameId, double>>& stamps, double max_gap_s) {
+                         const std::vector<FrameTime>& stamps, double max_gap_s) {
   Trajectory trajectory;
   const Pose Tr = poses.format == PoseFormat::kKitti ? T_camera_lidar.value_or(Pose::Identity()) : Pose::Identity();
-  const std::map<FrameId, double> stamp_of(stamps.begin(), stamps.end());
+  std::map<FrameId, double> stamp_of;
+  for (const FrameTime& each : stamps) stamp_of.emplace(each.frame, each.stamp_s);
   if (poses.format == PoseFormat::kTum) {
     std::map<double, Pose> by_time;
     for (const PoseRow& row : poses.rows) by_time.emplace(*row.stamp_s, row.T_world_body);

@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
+#include <revisit/core/exclusion.hpp>
 #include <revisit/core/pose.hpp>
 #include <revisit/core/result.hpp>
 
@@ -32,8 +32,12 @@ struct PoseFile {
 /// A row that is no rigid transform is an error that names file and line.
 Result<PoseFile> read_poses(const std::filesystem::path& file);
 
+struct TimedPosition {
+  double stamp_s = 0.0;
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
+};
 /// Times and positions of a TUM file whose rotations cannot be used.
-Result<std::vector<std::pair<double, Eigen::Vector3d>>> read_tum_positions(const std::filesystem::path& file);
+Result<std::vector<TimedPosition>> read_tum_positions(const std::filesystem::path& file);
 
 /// Row i holds frame i, from 0 to the last frame with a pose; frames without one are rows of NaN.
 /// The poses are written in the camera frame where `T_camera_lidar` is given: T_c0_ci = Tr T_l0_li Tr^-1.
@@ -46,6 +50,6 @@ Status write_g2o_poses(const std::filesystem::path& file, const Trajectory& traj
 /// the time of each frame of `stamps`: interpolated between rows at most twice `max_gap_s` apart, else the nearer row
 /// within `max_gap_s`.
 Trajectory to_trajectory(const PoseFile& poses, const std::optional<Pose>& T_camera_lidar,
-                         const std::vector<std::pair<FrameId, double>>& stamps, double max_gap_s = 0.05);
+                         const std::vector<FrameTime>& stamps, double max_gap_s = 0.05);
 
 }  // namespace revisit

@@ -39,7 +39,7 @@ void expect_same(const Trajectory& got, const Trajectory& expected) {
   }
 }
 
-const std::vector<std::pair<FrameId, double>> kStamps = {{FrameId{0}, 100.0}, {FrameId{1}, 100.1}, {FrameId{4}, 100.4}};
+const std::vector<FrameTime> kStamps = {{FrameId{0}, 100.0}, {FrameId{1}, 100.1}, {FrameId{4}, 100.4}};
 
 TEST(PoseFile, EveryFormatReadsBackWhatWasWritten) {
   const fs::path folder = fresh_folder();

@@ -78,8 +78,8 @@ class FolderRecording final : public Recording {
 
   // Poses of frames that the recording does not hold are left out.
   Trajectory of_scans(const PoseFile& poses) const {
-    std::vector<std::pair<FrameId, double>> stamps;
-    for (const ScanFile& scan : scans_) stamps.emplace_back(scan.frame, scan.stamp_s);
+    std::vector<FrameTime> stamps;
+    for (const ScanFile& scan : scans_) stamps.push_back({scan.frame, scan.stamp_s});
     const Trajectory all = to_trajectory(poses, T_camera_lidar_, stamps);
     Trajectory present;
     for (const ScanFile& scan : scans_)

@@ -68,11 +68,11 @@ ResultWriter::ResultWriter(ResultWriter&&) noexcept = default;
 ResultWriter& ResultWriter::operator=(ResultWriter&&) noexcept = default;
 ResultWriter::~ResultWriter() = default;
 
-Result<ResultWriter> ResultWriter::create(const fs::path& folder, bool overwrite) {
+Result<ResultWriter> ResultWriter::create(const fs::path& folder, Existing existing) {
   std::error_code failure;
   fs::create_directories(folder, failure);
   if (failure) return Error{folder.string() + ": cannot be created: " + failure.message()};
-  if (const fs::path existing = folder / "candidates.csv"; !overwrite && fs::exists(existing, failure))
+  if (const fs::path earlier = folder / "candidates.csv"; existing == Existing::kRefuse && fs::exists(earlier, failure))
     return Error{folder.string() + ": already holds a result; name another folder or pass --overwrite"};
   // What an earlier run left would otherwise stand beside rows that it does not belong to.
   for (const char* name :

@@ -15,8 +15,9 @@ namespace revisit {
 /// so that nothing computed is lost. Not for several threads.
 class ResultWriter {
  public:
-  /// Creates `folder` and both files. An existing result is an error unless `overwrite`.
-  static Result<ResultWriter> create(const std::filesystem::path& folder, bool overwrite);
+  enum class Existing { kRefuse, kReplace };  ///< results of an earlier run in the folder
+  /// Creates `folder` and both files.
+  static Result<ResultWriter> create(const std::filesystem::path& folder, Existing existing);
   ResultWriter(ResultWriter&&) noexcept;
   ResultWriter& operator=(ResultWriter&&) noexcept;
   ~ResultWriter();

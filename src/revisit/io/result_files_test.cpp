@@ -22,7 +22,7 @@ std::string content(const fs::path& file) {
 
 TEST(ResultFiles, RowsAreCompleteAsSoonAsTheyAreAdded) {
   const fs::path folder = fresh_folder() / "new" / "folder";
-  auto writer = ResultWriter::create(folder, false);
+  auto writer = ResultWriter::create(folder, ResultWriter::Existing::kRefuse);
   ASSERT_TRUE(writer) << writer.error().message;
   ASSERT_TRUE(writer->add(CandidateRow{FrameId{70}, FrameId{3}, 0.75, false, "a, b"}));
   ASSERT_TRUE(writer->add(CandidateRow{FrameId{71}, std::nullopt, 0.0, false, "no place like it"}));
@@ -47,13 +47,13 @@ TEST(ResultFiles, RowsAreCompleteAsSoonAsTheyAreAdded) {
 
 TEST(ResultFiles, ExistingResultsAreKept) {
   const fs::path folder = fresh_folder();
-  ASSERT_TRUE(ResultWriter::create(folder, false));
-  const auto second = ResultWriter::create(folder, false);
+  ASSERT_TRUE(ResultWriter::create(folder, ResultWriter::Existing::kRefuse));
+  const auto second = ResultWriter::create(folder, ResultWriter::Existing::kRefuse);
   ASSERT_FALSE(second);
   EXPECT_NE(second.error().message.find("--overwrite"), std::string::npos);
   std::ofstream(folder / "poses.txt") << "of an earlier run";
   std::ofstream(folder / "notes.txt") << "of the user";
-  EXPECT_TRUE(ResultWriter::create(folder, true));
+  EXPECT_TRUE(ResultWriter::create(folder, ResultWriter::Existing::kReplace));
   EXPECT_FALSE(fs::exists(folder / "poses.txt"));
   EXPECT_TRUE(fs::exists(folder / "notes.txt"));
 }
@@ -62,7 +62,7 @@ TEST(ResultFiles, AFullDiskIsNoticed) {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "needs /dev/full";
   const fs::path folder = fresh_folder();
   fs::create_symlink("/dev/full", folder / "candidates.csv");
-  const auto writer = ResultWriter::create(folder, true);
+  const auto writer = ResultWriter::create(folder, ResultWriter::Existing::kReplace);
   ASSERT_FALSE(writer);
   EXPECT_NE(writer.error().message.find("candidates.csv: cannot be written: No space left"), std::string::npos)
       << writer.error().message;

@@ -10,7 +10,7 @@
 
 namespace revisit {
 
-/// The map of an earlier `revisit slam`, opened to be asked: its key frames at the poses that its loops give them.
+/// The map of an earlier `revisit slam`: its key frames at the poses that its loops give them.
 /// Belongs to one thread at a time.
 class SavedMap {
  public:

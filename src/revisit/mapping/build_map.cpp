@@ -148,7 +148,7 @@ Result<std::vector<Point>> collect_map(const MapInput& input, const MapOptions& 
   std::size_t moving = 0, thin_at = 4'000'000;
   const Status status = for_each_keyframe(input, options, moving, [&](const std::vector<Point>& placed, std::size_t) {
     points.insert(points.end(), placed.begin(), placed.end());
-    // Thinned on the way: most of what a key frame sees is in the map already.
+    // Thinned meanwhile: most of what a key frame sees is in the map already.
     if (points.size() > thin_at) {
       points = one_point_a_voxel(points, options.voxel_m);
       thin_at = std::max(thin_at, 2 * points.size());

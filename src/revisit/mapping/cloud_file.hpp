@@ -13,7 +13,7 @@ namespace revisit {
 
 enum class CloudFormat { kPly, kPcd };
 
-/// Writes points with intensity, binary, piece by piece: a cloud may be larger than memory.
+/// Writes points with intensity, binary, part by part: a cloud may be larger than memory.
 class CloudFile {
  public:
   /// The header tells how many points follow: add() exactly `count`.

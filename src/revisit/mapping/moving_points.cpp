@@ -10,6 +10,12 @@
 namespace revisit::mapping_internal {
 namespace {
 
+// Margins from what poses and grazing angles bring at 30 m (docs/slam.md).
+struct Moving {
+  static constexpr float kMargin_m = 0.5f, kMarginShare = 0.02f;  ///< of the range
+  static constexpr int kFewest = 2;                               ///< observers that saw through a point
+};
+
 constexpr int kAzimuths = 360, kElevations = 90;
 constexpr auto kCellsARad = static_cast<float>(kAzimuths / (2.0 * kPi));
 
@@ -56,8 +62,7 @@ VisibilityImage::Verdict VisibilityImage::look(const Eigen::Vector3f& p) const {
   const Cell cell = cell_of(p.x(), p.y(), p.z());
   const float nearest_m = cell.is_inside() ? ranges_m_[index_of(cell.azimuth, cell.elevation)] : 0.f;
   if (nearest_m == 0.f) return Verdict::kUnknown;
-  constexpr float kMargin_m = 0.5f, kMarginShare = 0.02f;
-  const float range_m = p.norm(), margin_m = kMargin_m + kMarginShare * range_m;
+  const float range_m = p.norm(), margin_m = Moving::kMargin_m + Moving::kMarginShare * range_m;
   if (nearest_m > range_m + margin_m) return Verdict::kThrough;
   return nearest_m > range_m - margin_m ? Verdict::kSurface : Verdict::kUnknown;
 }
@@ -75,8 +80,7 @@ std::vector<std::uint8_t> find_moving(std::span<const Point> points, const Pose&
       through += verdict == VisibilityImage::Verdict::kThrough;
       surface += verdict == VisibilityImage::Verdict::kSurface;
     }
-    constexpr int kFewest = 2;
-    return through >= kFewest && through > surface;
+    return through >= Moving::kFewest && through > surface;
   };
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 1024), [&](const auto& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) is_moving[i] = judge(points[i]) ? 1 : 0;

@@ -22,6 +22,13 @@ struct IndexHash {
   }
 };
 
+struct Planes {
+  static constexpr std::uint32_t kFewest = 5;  ///< points
+  static constexpr float kFlat = 0.1f;         ///< least over middle spread, at most
+  static constexpr float kWide = 0.02f;        ///< middle over largest spread, at least: a line has no normal
+  static constexpr std::uint32_t kMost = 100;  ///< points a voxel; more say nothing new
+};
+
 // Sums over points, taken from a place near them so that floats suffice.
 struct Sums {
   Eigen::Vector3f origin = Eigen::Vector3f::Zero(), first = Eigen::Vector3f::Zero();
@@ -46,22 +53,18 @@ struct Sums {
 
   // The normal of the plane that the points lie on; zero where they lie on none.
   Eigen::Vector3f normal() const {
-    constexpr std::uint32_t kFewest = 5;
-    constexpr float kFlat = 0.1f;   // least over middle spread, at most
-    constexpr float kWide = 0.02f;  // middle over largest spread, at least: a line has no normal
-    if (count < kFewest) return Eigen::Vector3f::Zero();
+    if (count < Planes::kFewest) return Eigen::Vector3f::Zero();
     const Eigen::Vector3f centre = first / static_cast<float>(count);
     const Eigen::Matrix3f covariance = second / static_cast<float>(count) - centre * centre.transpose();
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
     solver.computeDirect(covariance);
     const Eigen::Vector3f spread = solver.eigenvalues();
-    if (spread[0] > kFlat * spread[1] || spread[1] < kWide * spread[2]) return Eigen::Vector3f::Zero();
+    if (spread[0] > Planes::kFlat * spread[1] || spread[1] < Planes::kWide * spread[2]) return Eigen::Vector3f::Zero();
     return solver.eigenvectors().col(0);
   }
 };
 
 struct Voxel {
-  static constexpr std::uint32_t kMost = 100;  ///< points; more tell nothing new
   Sums sums;
   Surface::Patch patch;
   bool is_stale = false;  ///< points were added since the patch was found
@@ -111,7 +114,7 @@ void LocalMap::add(std::span<const Eigen::Vector3f> points) {
   for (const Eigen::Vector3f& p : points) {
     const Index index = (p / voxel_m_).array().floor().cast<int>();
     Voxel& voxel = voxels_->map[index];
-    if (voxel.sums.count >= Voxel::kMost) continue;
+    if (voxel.sums.count >= Planes::kMost) continue;
     voxel.sums.add(p);
     if (!voxel.is_stale) stale.push_back(index);
     voxel.is_stale = true;

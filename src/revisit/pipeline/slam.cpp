@@ -64,8 +64,7 @@ Result<SlamStep> Slam::process(Scan scan, const std::optional<Pose>& T_external_
 
   if (front->keyframe) {
     const SeenSpace seen = front->keyframe->cloud.seen;
-    auto added =
-        back_end_.add_keyframe(*std::move(front->keyframe), odometry, front->starts_segment, front_end_.sensor());
+    auto added = back_end_.add_keyframe(*std::move(front->keyframe), odometry, front_end_.sensor());
     if (!added) {
       (void)store_->roll_back();
       failure_ = added.error();

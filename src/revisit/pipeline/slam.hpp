@@ -27,7 +27,7 @@ struct SlamStep {
   } ms;
 };
 
-/// What a Slam may be told beyond the parameters.
+/// Settings of a Slam beyond the parameters.
 struct SlamSetup {
   std::optional<IntensityScale> scale;  ///< without, the first ten key frames decide it
   IntensityCalibration calibration = {};
@@ -36,13 +36,13 @@ struct SlamSetup {
 };
 
 /// Scans in; trajectory, loops and map out, online. Takes scans as a driver delivers them. Everything is kept in a
-/// store: a temporary one, or a folder, with which a run that was cut off goes on. In memory are the surroundings, the
+/// store: a temporary one, or a folder, from which an interrupted run continues. In memory are the surroundings, the
 /// index and the graph. Frames increase. Belongs to one thread at a time.
 class Slam {
  public:
   /// Throws std::invalid_argument for parameters out of range.
   explicit Slam(const Parameters& parameters = {}, const SlamSetup& setup = {});
-  /// Keeps the map in `folder` (map.sqlite), and goes on with the one that is there.
+  /// Keeps the map in `folder` (map.sqlite), and continues the one that is there.
   static Result<Slam> open(const std::filesystem::path& folder, const Parameters& parameters = {},
                            const SlamSetup& setup = {});
   /// The same with a store that was opened already.
@@ -54,7 +54,7 @@ class Slam {
   Result<SlamStep> process(Scan scan, const std::optional<Pose>& T_external_lidar = std::nullopt);
   /// Decides about loops that wait for others, and settles the graph. More scans may follow.
   Status finish();
-  /// The pose of the external odometry at the last scan of the map that this run goes on with.
+  /// The pose of the external odometry at the last scan of the map that this run continues.
   void restore_external(const Pose& T_external_lidar) { front_end_.restore_external(T_external_lidar); }
   bool has_failed() const { return !failure_; }  ///< the store has
 

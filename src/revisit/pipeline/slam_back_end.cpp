@@ -7,6 +7,7 @@
 #include <oneapi/tbb/parallel_invoke.h>
 
 #include <revisit/core/stopwatch.hpp>
+#include <revisit/core/text.hpp>
 #include <revisit/pose_graph/edge_information.hpp>
 #include <revisit/store/keyframe_bytes.hpp>
 #include <revisit/store/stored_clouds.hpp>
@@ -22,8 +23,6 @@ bool is_near(const Pose& T) {
   return T.translation().norm() < kKnownPlace_m && rotation_angle(T) < to_radians(kKnownPlace_deg);
 }
 
-std::string text_of(FrameId frame) { return "frame " + std::to_string(frame.value); }
-
 }  // namespace
 
 SlamBackEnd::SlamBackEnd(const Parameters& parameters, Odometry::Source source, std::shared_ptr<MapStore> store,
@@ -35,20 +34,22 @@ SlamBackEnd::SlamBackEnd(const Parameters& parameters, Odometry::Source source, 
       recognition_(parameters, clouds_in_store(store_)) {}
 
 Result<SlamBackEnd::Added> SlamBackEnd::add_keyframe(PreparedScan scan, const OdometryStep& odometry,
-                                                     bool starts_segment, const SensorFacts& sensor) {
+                                                     const SensorFacts& sensor) {
   Stopwatch watch;
   Added added;
   const FrameId frame = scan.scan.frame;
   const bool is_first = graph_.keyframes().empty();
-  const TrajectoryPoint point = is_first || starts_segment ? TrajectoryPoint{.segment = odometry.segment,
-                                                                             .T_segment_lidar = odometry.T_odom_lidar}
-                                                           : graph_.last_point().to(odometry.T_odom_lidar);
+  const bool is_new_segment = is_first || odometry.segment != graph_.last_point().segment;
+  const TrajectoryPoint point =
+      is_new_segment ? TrajectoryPoint{.segment = odometry.segment, .T_segment_lidar = odometry.T_odom_lidar}
+                     : graph_.last_point().to(odometry.T_odom_lidar);
+  const bool starts = starts_segment(point);
   scan.trajectory_point = point;
   // The cloud is thinned for the map meanwhile, for nothing where the place turns out to be known.
   Result<Detection> detection = Error{};
   Bytes map_cloud;
   tbb::parallel_invoke(
-      [&] { detection = find_loop(scan, starts_segment, sensor); },
+      [&] { detection = find_loop(scan, sensor); },
       [&] {
         map_cloud = to_map_bytes(thin_surfaces(scan.scan.points, scan.ground.is_ground, parameters_.slam.map_voxel_m));
       });
@@ -71,7 +72,7 @@ Result<SlamBackEnd::Added> SlamBackEnd::add_keyframe(PreparedScan scan, const Od
   for (LoopGate::Decision& decision : graph_.decide_overdue()) decisions.push_back(std::move(decision));
   added.graph_ms = watch.lap_ms();
 
-  StoredKeyframe keyframe{frame, scan.scan.stamp_s, odometry.T_odom_lidar, starts_segment, {}, {}, {}};
+  StoredKeyframe keyframe{frame, scan.scan.stamp_s, odometry.T_odom_lidar, starts, {}, {}, {}};
   if (!is_known_place) {
     keyframe.descriptor = to_bytes(scan.descriptor);
     keyframe.place = to_bytes(scan.cloud);
@@ -93,16 +94,22 @@ Result<SlamBackEnd::Added> SlamBackEnd::add_keyframe(PreparedScan scan, const Od
   return added;
 }
 
+// Tracking was lost before this key frame: how it lies to the one before is not known.
+bool SlamBackEnd::starts_segment(const TrajectoryPoint& point) const {
+  return !graph_.keyframes().empty() && point.segment != graph_.last_point().segment;
+}
+
 // A segment that is not attached yet is looked for in everything that was mapped before it, however recent.
-Result<Detection> SlamBackEnd::find_loop(const PreparedScan& keyframe, bool starts_segment, const SensorFacts& sensor) {
-  const auto last_attached = starts_segment ? std::optional(graph_.keyframes().back()) : graph_.last_attached();
+Result<Detection> SlamBackEnd::find_loop(const PreparedScan& keyframe, const SensorFacts& sensor) {
+  const auto last_attached =
+      starts_segment(*keyframe.trajectory_point) ? std::optional(graph_.keyframes().back()) : graph_.last_attached();
   const PlaceIndex& index = recognition_.index();
   const FrameTime frame{keyframe.scan.frame, keyframe.scan.stamp_s};
   const std::size_t places = last_attached ? index.until(*last_attached) : index.searchable(frame);
   auto detection = recognition_.find(keyframe, places, sensor.typical);
   // A place that cannot be read gives no loop; the key frame is one all the same.
   if (!detection)
-    log_to(log_, LogLevel::kWarning, text_of(frame.frame) + ": no loop is searched: " + detection.error().message);
+    log_to(log_, LogLevel::kWarning, to_text(frame.frame) + ": no loop is searched: " + detection.error().message);
   return detection;
 }
 
@@ -119,8 +126,8 @@ Status SlamBackEnd::enter(const std::vector<LoopGate::Decision>& decisions, std:
     LoopConstraint loop = decision.loop;
     if (!decision.enters) {
       log_to(log_, LogLevel::kInfo,
-             "the loop from " + text_of(loop.query) + " to " + std::to_string(loop.match.value) +
-                 " stays out of the graph: no other one agrees with it");
+             "the loop from " + to_text(loop.query) + " to " + std::to_string(loop.match.value) +
+                 " stays out of the graph: no other one agrees with it, or one that entered contradicts it");
       continue;
     }
     loop.information = loop_information(loop.information);
@@ -130,7 +137,7 @@ Status SlamBackEnd::enter(const std::vector<LoopGate::Decision>& decisions, std:
     if (const Status status = store_->add(edge); !status) return status;
     if (attaches)
       log_to(log_, LogLevel::kInfo,
-             text_of(loop.query) + ": found again in the map, at frame " + std::to_string(loop.match.value));
+             to_text(loop.query) + ": found again in the map, at frame " + std::to_string(loop.match.value));
   }
   return ok();
 }

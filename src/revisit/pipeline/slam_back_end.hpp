@@ -23,10 +23,8 @@ class SlamBackEnd {
     std::size_t loops_entered = 0;
     double detect_ms = 0.0, graph_ms = 0.0, store_ms = 0.0;
   };
-  /// `starts_segment`: how the key frame lies to the one before is not known. An error where the store failed: it and
-  /// the graph are then no longer the same.
-  Result<Added> add_keyframe(PreparedScan scan, const OdometryStep& odometry, bool starts_segment,
-                             const SensorFacts& sensor);
+  /// An error where the store failed: it and the graph are then no longer the same.
+  Result<Added> add_keyframe(PreparedScan scan, const OdometryStep& odometry, const SensorFacts& sensor);
   /// Decides about loops that wait for others, and settles the graph.
   Status finish();
   Status restore(const StoredSession& session);
@@ -34,7 +32,8 @@ class SlamBackEnd {
   const KeyframeGraph& graph() const { return graph_; }
 
  private:
-  Result<Detection> find_loop(const PreparedScan& keyframe, bool starts_segment, const SensorFacts& sensor);
+  bool starts_segment(const TrajectoryPoint& point) const;
+  Result<Detection> find_loop(const PreparedScan& keyframe, const SensorFacts& sensor);
   KeyframeGraph::OdometryEdge edge_to(const TrajectoryPoint& point, const Matrix6& information) const;
   Status enter(const std::vector<LoopGate::Decision>& decisions, std::size_t& entered);
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include <revisit/core/stopwatch.hpp>
+#include <revisit/core/text.hpp>
 #include <revisit/preprocess/range_filter.hpp>
 
 namespace revisit {
@@ -12,8 +13,6 @@ namespace {
 
 // Pairs of consecutive scans after which their typical agreement is known: its mean is then within 1 %.
 constexpr std::size_t kTypicalPairs = 40;
-
-std::string text_of(FrameId frame) { return "frame " + std::to_string(frame.value); }
 
 }  // namespace
 
@@ -29,7 +28,7 @@ SlamFrontEnd::SlamFrontEnd(const Parameters& parameters, Odometry::Source source
 Result<SlamFrontEnd::Step> SlamFrontEnd::step(Scan scan, const std::optional<Pose>& T_external_lidar) {
   filter_range(scan, parameters_.preprocess);
   if (scan.points.empty())
-    return Error{text_of(scan.frame) + ": no point between " + std::to_string(parameters_.preprocess.min_range_m) +
+    return Error{to_text(scan.frame) + ": no point between " + std::to_string(parameters_.preprocess.min_range_m) +
                  " and " + std::to_string(parameters_.preprocess.max_range_m) + " m"};
   Stopwatch watch;
   Step step;
@@ -81,10 +80,10 @@ void SlamFrontEnd::accept_keyframe(const OdometryStep& odometry, const SeenSpace
 void SlamFrontEnd::report(FrameId frame, const OdometryStep& odometry) const {
   if (odometry.stamp_was_replaced)
     log_to(log_, LogLevel::kWarning,
-           text_of(frame) + ": its stamp is not after that of the scan before; a tenth of a second later is taken");
+           to_text(frame) + ": its stamp is not after that of the scan before; a tenth of a second later is taken");
   if (odometry.lost)
     log_to(log_, LogLevel::kWarning,
-           text_of(frame) +
+           to_text(frame) +
                ": tracking is lost; a new segment of the trajectory begins, until its place in the map is found");
 }
 

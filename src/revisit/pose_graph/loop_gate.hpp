@@ -10,8 +10,8 @@
 namespace revisit {
 
 /// Pairwise consistency (Mangelson et al., ICRA 2018): two loops close a circle with the odometry between their ends.
-/// A loop enters the graph once another one near it agrees; one that stays alone must be very sure.
-/// Belongs to one thread at a time.
+/// An accepted loop enters the graph once another one near it agrees; one that stays alone must be very sure, and no
+/// loop that entered may contradict it. Belongs to one thread at a time.
 class LoopGate {
  public:
   /// A key frame as odometry alone places it. Frames increase; otherwise std::invalid_argument.

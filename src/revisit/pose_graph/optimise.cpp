@@ -140,7 +140,7 @@ Result<PoseGraph::Report> PoseGraph::optimise(double settled) {
   for (const PoseEdge& edge : edges_)
     if (edge.is_loop && edge.weight > 0.0) worst = std::max(worst, squared(edge));
   if (worst > kTruncation) {
-    // Some contradict: all are heard again, from the poses that these did not bend, and those that cannot be satisfied
+    // Some contradict: all are tried again, from the poses that these did not bend, and those that cannot be satisfied
     // fade.
     start_over();
     worst = 0.0;

@@ -34,9 +34,6 @@ struct GroundSegmentation {
 /// within the slope. `rings` come from find_rings(scan).
 GroundSegmentation segment_ground(const Scan& scan, const Rings& rings, const PreprocessOptions& options);
 
-/// What is assumed where no ground is seen: a sensor on the roof of a car.
-constexpr double kGroundBelowCarSensor_m = -1.73;
-
 /// Height of the ground around the sensor, metres in the sensor's frame (negative): the median of ground points nearby.
 double ground_height_m(std::span<const Point> points, std::span<const std::uint8_t> is_ground);
 /// The points that are not on the ground, in their order.

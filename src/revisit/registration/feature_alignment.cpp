@@ -12,6 +12,13 @@
 namespace revisit {
 namespace {
 
+struct Ransac {
+  static constexpr std::size_t kFewestInliers = 10;  ///< of an alignment that is worth refining
+  static constexpr int kTrials = 20000;              ///< triples drawn; most end at the first length
+  static constexpr double kTolerance_m = 1.0;        ///< a voxel
+  static constexpr double kShortestSide_m = 3.0;     ///< of a triple that fixes a rotation
+};
+
 struct Match {
   Eigen::Vector3d target, source;
 };
@@ -82,31 +89,28 @@ std::vector<std::size_t> agreeing(const std::vector<Match>& matches, const Pose&
 std::optional<FeatureAlignment> align_features(const SurfaceCloud& target, const Features& target_features,
                                                const SurfaceCloud& source, const Features& source_features) {
   const std::vector<Match> matches = mutual_matches(target, target_features, source, source_features);
-  constexpr std::size_t kFewestInliers = 10;
-  if (matches.size() < kFewestInliers) return std::nullopt;
-  constexpr int kTrials = 20000;
-  constexpr double kTolerance_m = 1.0, kShortestSide_m = 3.0;
+  if (matches.size() < Ransac::kFewestInliers) return std::nullopt;
   std::minstd_rand random(1);
   std::vector<std::size_t> best;
   std::vector<std::size_t> sample(3);
-  for (int trial = 0; trial < kTrials; ++trial) {
+  for (int trial = 0; trial < Ransac::kTrials; ++trial) {
     for (auto& each : sample) each = random() % matches.size();
     // Rigid motion keeps lengths: most wrong samples end here, before anything is fitted.
     bool plausible = true;
     for (std::size_t i = 0; i < 3 && plausible; ++i) {
       const Match &a = matches[sample[i]], &b = matches[sample[(i + 1) % 3]];
       const double in_target = (a.target - b.target).norm(), in_source = (a.source - b.source).norm();
-      plausible = in_source > kShortestSide_m && std::abs(in_target - in_source) < kTolerance_m;
+      plausible = in_source > Ransac::kShortestSide_m && std::abs(in_target - in_source) < Ransac::kTolerance_m;
     }
     if (!plausible) continue;
-    auto inliers = agreeing(matches, fit(matches, sample), kTolerance_m);
+    auto inliers = agreeing(matches, fit(matches, sample), Ransac::kTolerance_m);
     if (inliers.size() > best.size()) best = std::move(inliers);
   }
-  if (best.size() < kFewestInliers) return std::nullopt;
+  if (best.size() < Ransac::kFewestInliers) return std::nullopt;
   FeatureAlignment result;
   result.matches = matches.size();
   result.T_target_source = fit(matches, best);
-  result.inliers = agreeing(matches, result.T_target_source, kTolerance_m).size();
+  result.inliers = agreeing(matches, result.T_target_source, Ransac::kTolerance_m).size();
   return result;
 }
 

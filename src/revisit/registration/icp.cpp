@@ -15,7 +15,19 @@
 namespace revisit {
 namespace {
 
-constexpr double kAllPointsBelow_m = 1.0;
+struct Steps {
+  static constexpr double kAllPointsBelow_m =
+      1.0;  ///< kernel width: while wider, a quarter of the points gives the step
+  static constexpr std::size_t kPointsATask = 1024;
+  static constexpr std::size_t kFewestPairs = 20;
+  static constexpr double kShrink = 0.7;       ///< of the kernel's width, once the pose is steady
+  static constexpr double kSteady = 0.03;      ///< motion of a point 20 m away, in kernel widths
+  static constexpr double kToAndFro_m = 0.01;  ///< the same, where neighbours change to and fro: converged
+  static constexpr double kAcross = 1e-3;      ///< covariance across a plane, 1 along it (Segal et al., RSS 2009)
+  static constexpr double kArm_m = 10.0;       ///< at which turns are weighed against translations
+  // Points share the errors of the surfaces that they lie on, so that they count for fewer than they are.
+  static constexpr double kPointsThatCountAsOne = 10.0, kLeastNoise_m = 0.02;
+};
 
 // The normal equations of a Gauss-Newton step (metres, then radians about the source's origin, both along the target's
 // axes), summed over points. About the target's origin, which a map may have a kilometre away, turns and translations
@@ -53,10 +65,9 @@ Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& p) {
 // The metric of generalised ICP between two patches, scaled so that parallel planes count by their distance alone:
 // the inverse of the sum of covariances that are 1 along a plane and next to nothing across it.
 Eigen::Matrix3d plane_to_plane(const Eigen::Vector3d& n, const Eigen::Vector3d& m) {
-  constexpr double kAcross = 1e-3;
   const Eigen::Matrix3d covariance =
-      2.0 * Eigen::Matrix3d::Identity() - (1.0 - kAcross) * (n * n.transpose() + m * m.transpose());
-  return 2.0 * kAcross * covariance.inverse();
+      2.0 * Eigen::Matrix3d::Identity() - (1.0 - Steps::kAcross) * (n * n.transpose() + m * m.transpose());
+  return 2.0 * Steps::kAcross * covariance.inverse();
 }
 
 // The patches that the points of the source met last: from one step to the next few change, so that only what is nearer
@@ -111,22 +122,20 @@ Equations equations_of(const Surface& target, Points source, Points source_norma
   return sum;
 }
 
-// What the equations at T say about its error, seen from the source. Points share the errors of the surfaces that they
-// lie on, so that they count for fewer than they are.
+// What the equations at T say about its error, seen from the source.
 Matrix6 information_of(const Equations& sum, const Pose& T) {
-  constexpr double kPointsThatCountAsOne = 10.0, kLeastNoise_m = 0.02;
-  const double variance_m2 = std::max(kLeastNoise_m * kLeastNoise_m, sum.weighted_squares_m2 / sum.weights);
+  const double variance_m2 =
+      std::max(Steps::kLeastNoise_m * Steps::kLeastNoise_m, sum.weighted_squares_m2 / sum.weights);
   Matrix6 axes = Matrix6::Zero();
   axes.topLeftCorner<3, 3>() = axes.bottomRightCorner<3, 3>() = T.linear();
-  return axes.transpose() * sum.H * axes / (kPointsThatCountAsOne * variance_m2);
+  return axes.transpose() * sum.H * axes / (Steps::kPointsThatCountAsOne * variance_m2);
 }
 
 // The step without its part along directions that next to nothing fixes (Zhang et al., "On degeneracy of
 // optimization-based state estimation problems", ICRA 2016).
 Vector6 seen_part(const Vector6& xi, const Equations& sum, double least_seen) {
-  constexpr double kArm_m = 10.0;
   Vector6 scale;
-  scale << Eigen::Vector3d::Ones(), Eigen::Vector3d::Constant(kArm_m);
+  scale << Eigen::Vector3d::Ones(), Eigen::Vector3d::Constant(Steps::kArm_m);
   const Matrix6 per_point = scale.cwiseInverse().asDiagonal() * sum.H * scale.cwiseInverse().asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Matrix6> axes(per_point / sum.weights);
   const Vector6 along = axes.eigenvectors().transpose() * scale.cwiseProduct(xi);
@@ -138,12 +147,11 @@ Vector6 seen_part(const Vector6& xi, const Equations& sum, double least_seen) {
 bool step(const Surface& target, Points source, const IcpOptions& options, double width_m, Met& met, IcpResult& result,
           double& moved) {
   Pose& T = result.T_target_source;
-  // While the kernel is wide, some of the points show the way as well as all.
-  const std::size_t stride = width_m > kAllPointsBelow_m ? 4 : 1;
+  // While the kernel is wide, some of the points give the step as well as all.
+  const std::size_t stride = width_m > Steps::kAllPointsBelow_m ? 4 : 1;
   // Split and summed in one order, whatever the number of threads.
-  constexpr std::size_t kPointsATask = 1024;
   Equations sum = tbb::parallel_deterministic_reduce(
-      tbb::blocked_range<std::size_t>(0, source.size(), kPointsATask * stride), Equations{},
+      tbb::blocked_range<std::size_t>(0, source.size(), Steps::kPointsATask * stride), Equations{},
       [&](const tbb::blocked_range<std::size_t>& range, Equations part) {
         part.add(equations_of(target, source, options.source_normals, range.begin(), range.end(), stride, width_m,
                               std::max(width_m, options.least_reach_m), T, met));
@@ -158,8 +166,7 @@ bool step(const Surface& target, Points source, const IcpOptions& options, doubl
     result.matched = share * sum.weights;
     result.met = share * static_cast<double>(sum.pairs);
   }
-  constexpr std::size_t kFewestPairs = 20;
-  if (sum.pairs < kFewestPairs) return false;
+  if (sum.pairs < Steps::kFewestPairs) return false;
   result.information = information_of(sum, T);
   sum.H.diagonal().array() += 1e-6 * sum.H.diagonal().maxCoeff();  // a direction that nothing sees stays where it was
   Vector6 xi = sum.H.ldlt().solve(-sum.g);
@@ -178,7 +185,6 @@ IcpResult align_icp(const Surface& target, std::span<const Eigen::Vector3f> sour
                     const IcpOptions& options) {
   IcpResult result;
   result.T_target_source = T_guess_target_source;
-  constexpr double kShrink = 0.7, kSteady = 0.03, kToAndFro_m = 0.01;
   double width_m = options.coarse_m;
   Met met(source.size());
   for (; result.iterations < options.most_iterations; ++result.iterations) {
@@ -188,9 +194,9 @@ IcpResult align_icp(const Surface& target, std::span<const Eigen::Vector3f> sour
     result.last_step_m = moved;
     const bool fine = width_m <= options.fine_m;
     if (fine && result.matched < options.least_matched) break;
-    result.converged = fine && moved < kToAndFro_m;
+    result.converged = fine && moved < Steps::kToAndFro_m;
     if (fine && moved < options.settled_m) break;
-    if (moved < kSteady * width_m) width_m = std::max(options.fine_m, width_m * kShrink);
+    if (moved < Steps::kSteady * width_m) width_m = std::max(options.fine_m, width_m * Steps::kShrink);
   }
   return result;
 }

@@ -29,7 +29,7 @@ struct IcpOptions {
   int most_iterations = 60;
   double least_matched = 0.0;  ///< given up where, at the last width, a smaller share matches: another place
   /// Directions in which the surfaces' normals have on average a smaller square share than this stay as guessed: along
-  /// a bare corridor normals are noise. Turns count as the way of a point 10 m away.
+  /// a bare corridor normals are noise. Turns count as the motion of a point 10 m away.
   double least_seen = 0.0;
   /// Normals of the source, one a point: plane-to-plane (generalised ICP, Segal et al., RSS 2009, with the covariances
   /// of planes); empty: point-to-plane.

@@ -6,6 +6,8 @@
 
 #include <oneapi/tbb/parallel_for.h>
 
+#include <revisit/core/refusal_text.hpp>
+
 namespace revisit {
 
 std::vector<std::size_t> BaselineSearch::shortlist(const Place& query, std::size_t searchable) const {
@@ -45,7 +47,7 @@ std::optional<CandidateRow> BaselineSearch::process(const FrameTime& query_frame
     row->query = query_frame.frame;
     row->match = places_[compared[static_cast<std::size_t>(best - similarity.begin())]].frame.frame;
     row->score = *best;
-    row->reason = "retrieval only: no pose to verify";
+    row->reason = to_text(Refusal{Refusal::Reason::kNoPose});
   }
   places_.push_back(std::move(query));
   return row;

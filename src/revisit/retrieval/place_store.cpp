@@ -93,7 +93,7 @@ void PlaceStore::half_bounds(const revisit_bits_query& query, std::size_t begin,
   const std::size_t whole = (end - begin) / REVISIT_BITS_BLOCK, rest = (end - begin) % REVISIT_BITS_BLOCK;
   revisit_bits_half_bounds(&query, coarse, occupied, whole, bounds, least);
   if (rest == 0) return;
-  // The last block may be written to at this moment, beyond the places that are asked for: those alone are read. The
+  // The last block may be written to at this moment, beyond the places that are wanted: those alone are read. The
   // others are full: no bound is lower for them.
   coarse += whole * REVISIT_BITS_COLUMNS * REVISIT_BITS_BLOCK;
   alignas(64) std::uint8_t coarse_copy[REVISIT_BITS_COLUMNS * REVISIT_BITS_BLOCK] = {};

@@ -10,7 +10,7 @@
 
 namespace revisit {
 
-/// What a run learnt about the sensor of a map, for the runs that go on with it or localise in it.
+/// What a run learnt about the sensor of a map, for runs that continue it or localise in it.
 struct SensorFacts {
   IntensityScale intensity_scale;
   TypicalAgreement typical;

@@ -17,7 +17,7 @@
 
 namespace revisit {
 
-/// What a run left in its map, checked and put together: from it a later run goes on, or localises.
+/// What a run left in its map, checked and put together: a later run continues it, or localises in it.
 struct StoredSession {
   struct Keyframe {
     FrameTime frame;

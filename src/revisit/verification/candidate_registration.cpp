@@ -8,6 +8,7 @@
 
 #include <revisit/core/stopwatch.hpp>
 #include <revisit/descriptors/similarity.hpp>
+#include <revisit/verification/acceptance.hpp>
 
 namespace revisit {
 namespace {

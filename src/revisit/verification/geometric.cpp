@@ -7,6 +7,7 @@
 #include <revisit/registration/agreement.hpp>
 #include <revisit/registration/feature_alignment.hpp>
 #include <revisit/registration/icp.hpp>
+#include <revisit/verification/acceptance.hpp>
 
 namespace revisit {
 namespace {
@@ -18,8 +19,7 @@ struct Registration {
   // Good enough to judge; other places are noticed early (docs/accuracy.md, cost).
   static constexpr double kSettled_m = 1e-3, kLeastMatched = 0.12;
   static constexpr int kMostIterations = 40;
-  static constexpr double kFeatureRadius_m = 3.0;     ///< neighbourhood of an FPFH feature
-  static constexpr double kMostTranslation_m = 15.0;  ///< beyond, scans share too little to be right
+  static constexpr double kFeatureRadius_m = 3.0;  ///< neighbourhood of an FPFH feature
 };
 
 // Foliage and corners have normals that are off; a narrow kernel leaves them out, while patches are still looked for
@@ -28,19 +28,6 @@ struct Refinement {
   static constexpr double kCoarse_m = 0.25, kFine_m = 0.05, kReach_m = 1.0, kSettled_m = 1e-3;
   static constexpr double kMost_m = 0.15, kMost_rad = 0.02;
 };
-
-std::optional<Refusal> refusal_of(const GeometricEvidence& found, const GeometricOptions& options) {
-  using Reason = Refusal::Reason;
-  const LoopEvidence& evidence = found.evidence;
-  if (evidence.inlier_ratio < options.min_inlier_ratio)
-    return Refusal{Reason::kFewInliers, evidence.inlier_ratio, options.min_inlier_ratio};
-  if (found.probability < options.min_probability)
-    return Refusal{Reason::kImprobable, found.probability, options.min_probability};
-  if (!found.has_converged) return Refusal{Reason::kNotConverged};
-  if (evidence.distance_m > Registration::kMostTranslation_m)
-    return Refusal{Reason::kTooFar, evidence.distance_m, Registration::kMostTranslation_m};
-  return std::nullopt;
-}
 
 GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& query, const CandidateView& view,
                                 const GeometricOptions& options) {
@@ -71,12 +58,6 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
 }
 
 }  // namespace
-
-void decide(GeometricEvidence& found, double prior_log_odds, const GeometricOptions& options) {
-  found.log_odds = loop_log_odds(found.evidence) + prior_log_odds;
-  found.probability = probability_of(found.log_odds);
-  found.refusal = refusal_of(found, options);
-}
 
 void refine(GeometricEvidence& found, const ScanGeometry& match, const ScanGeometry& query) {
   const IcpResult icp = align_icp(match.surface(), query.surface().points(), found.T_match_query,

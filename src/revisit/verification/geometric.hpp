@@ -47,9 +47,6 @@ struct CandidateView {
 GeometricEvidence check_geometric(const ScanGeometry& match, const ScanGeometry& query, const CandidateView& view,
                                   const GeometricOptions& options);
 
-/// Decides once more on what was registered, with a prior (log odds) added.
-void decide(GeometricEvidence& found, double prior_log_odds, const GeometricOptions& options);
-
 /// Makes the pose of what was accepted as exact as the scans allow: a quarter of the error with 16 lines.
 void refine(GeometricEvidence& found, const ScanGeometry& match, const ScanGeometry& query);
 

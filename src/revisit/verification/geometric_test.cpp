@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <revisit/verification/acceptance.hpp>
+
 #include "synthetic_world.hpp"
 
 namespace revisit {

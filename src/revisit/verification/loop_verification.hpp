@@ -10,7 +10,7 @@
 namespace revisit {
 
 /// Which of the candidates of one query is its place, if any: docs/method.md, section 7. Lives as long as the query and
-/// the context.
+/// the context. A hypothesis is accepted or refused by decide() (acceptance.hpp); here the best one is chosen.
 class LoopVerification {
  public:
   LoopVerification(const VerificationContext& context, const VerificationQuery& query)

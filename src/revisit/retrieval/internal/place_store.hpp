@@ -31,7 +31,7 @@ struct ChunkLayout {
 };
 
 /// Places in the order in which they were added. Grows by chunks that never move: one thread adds while others read
-/// what was there when they asked for the size.
+/// what was there when they read the size.
 class PlaceStore {
  public:
   static constexpr std::size_t kChunk = ChunkLayout::kPlaces;

@@ -44,7 +44,7 @@ class Path {
 
 /// The path in a pose file. KITTI poses of a camera (z forward) and of a LiDAR are told apart by the direction of
 /// travel. Frames count 0.1 s where the file has no times. Where rotations cannot be used, the heading is that of
-/// travel, which `log` is told. Errors: one pose, NaN or missing poses, jumps, times that do not increase.
+/// travel, which is logged. Errors: one pose, NaN or missing poses, jumps, times that do not increase.
 Result<Path> read_path(const std::filesystem::path& file, const LogSink& log);
 
 struct Driving {

@@ -7,7 +7,7 @@
 namespace revisit::simulation_internal {
 
 // Randomness by key instead of by order: the same key gives the same number on every processor, in any thread, whoever
-// asked before. Only whole numbers and exactly rounded operations are used.
+// drawn before. Only whole numbers and exactly rounded operations are used.
 
 /// A key scattered over all 64 bits (the finaliser of splitmix64).
 inline std::uint64_t mix(std::uint64_t x) {

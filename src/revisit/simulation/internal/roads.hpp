@@ -15,7 +15,7 @@ struct LanePoint {
   float x, y, cos_yaw, sin_yaw, arc_m;
 };
 
-/// Which lane is nearest to a place on the ground; built once, then asked for each beam that meets the ground.
+/// Which lane is nearest to a place on the ground; built once, then used for each beam that meets the ground.
 class Roads {
  public:
   /// Sides of the road seen from the middle of its right lane, metres to the left.

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/verification/acceptance.hpp>
+
+namespace revisit {
+namespace {
+
+constexpr double kMostTranslation_m = 15.0;  // beyond, scans share too little to be right
+
+std::optional<Refusal> refusal_of(const GeometricEvidence& found, const GeometricOptions& options) {
+  using Reason = Refusal::Reason;
+  const LoopEvidence& evidence = found.evidence;
+  if (evidence.inlier_ratio < options.min_inlier_ratio)
+    return Refusal{Reason::kFewInliers, evidence.inlier_ratio, options.min_inlier_ratio};
+  if (found.probability < options.min_probability)
+    return Refusal{Reason::kImprobable, found.probability, options.min_probability};
+  if (!found.has_converged) return Refusal{Reason::kNotConverged};
+  if (evidence.distance_m > kMostTranslation_m)
+    return Refusal{Reason::kTooFar, evidence.distance_m, kMostTranslation_m};
+  return std::nullopt;
+}
+
+}  // namespace
+
+void decide(GeometricEvidence& found, double prior_log_odds, const GeometricOptions& options) {
+  found.log_odds = loop_log_odds(found.evidence) + prior_log_odds;
+  found.probability = probability_of(found.log_odds);
+  found.refusal = refusal_of(found, options);
+}
+
+}  // namespace revisit
