@@ -16,8 +16,8 @@ namespace {
 
 using registration_internal::ColumnGrid;
 
-constexpr int kBins = 11, kAngles = 3;  // as in the paper: 33 numbers
-using Histogram = Eigen::Matrix<float, kBins * kAngles, 1>;
+constexpr int kBins = 11, kAngles = 3, kNumbers = kBins * kAngles;  // as in the paper: 33
+using Histogram = Eigen::Matrix<float, kNumbers, 1>;
 
 struct Oriented {
   Eigen::Vector3f point, normal;
@@ -79,7 +79,7 @@ Features compute_features(const SurfaceCloud& cloud, double radius_m) {
   histograms.reserve(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) histograms.push_back(simplified(points, grid, i, radius));
 
-  features.values.resize(kBins * kAngles, static_cast<Eigen::Index>(points.size()));
+  features.values.resize(kNumbers, static_cast<Eigen::Index>(points.size()));
   for (std::size_t i = 0; i < points.size(); ++i) {
     // Its own, and those of its neighbours by their nearness; each angle in percent again.
     Histogram sum = Histogram::Zero();
@@ -91,7 +91,7 @@ Features compute_features(const SurfaceCloud& cloud, double radius_m) {
     });
     if (neighbours > 0.f) sum = histograms[i] + sum / neighbours;
     for (int k = 0; k < kAngles; ++k) {
-      auto angle = sum.segment<kBins>(k * kBins);
+      auto angle = sum.segment<kBins>(Eigen::Index{k} * kBins);
       if (const float all = angle.sum(); all > 0.f) angle *= 100.f / all;
     }
     features.values.col(static_cast<Eigen::Index>(i)) = sum;
