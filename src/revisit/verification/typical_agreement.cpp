@@ -12,7 +12,7 @@ namespace revisit {
 namespace {
 
 struct Typical {
-  static constexpr double kCoarse_m = 1.0, kSettled_m = 2e-3;  ///< of the registration of two scans in a row
+  static constexpr double kCoarse_m = 0.5, kSettled_m = 5e-3;  ///< of the registration of two scans in a row
   static constexpr double kStill_m = 0.05;                     ///< from the same spot, intensities would agree too well
   static constexpr double kNewShare = 0.3;          ///< of the newest pair in the running mean of inlier ratios
   static constexpr double kFewestInliers = 0.4;     ///< of a worse pair, odometry was wrong
