@@ -4,6 +4,7 @@
 #include <utility>
 
 #include <revisit/core/stopwatch.hpp>
+#include <revisit/core/text.hpp>
 #include <revisit/store/keyframe_bytes.hpp>
 
 namespace revisit {
@@ -53,6 +54,8 @@ Status Slam::restore() {
 
 Result<SlamStep> Slam::process(Scan scan, const std::optional<Pose>& T_external_lidar) {
   if (!failure_) return failure_.error();
+  if (last_frame_ && scan.frame <= *last_frame_)
+    return Error{to_text(scan.frame) + ": not after " + to_text(*last_frame_) + ", the last one of the map"};
   SlamStep step;
   step.frame = scan.frame;
   auto front = front_end_.step(std::move(scan), T_external_lidar);
