@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <oneapi/tbb/task_group.h>
+#include <Eigen/Eigenvalues>
 
 #include <revisit/registration/icp.hpp>
 #include <revisit/registration/surface_cloud.hpp>
@@ -31,6 +32,11 @@ struct Matching {
 
   static constexpr double kFewestMatched = 0.3;  ///< share of the points of a scan that is tracked
   static constexpr double kBelowTypical = 0.2;   ///< what it may fall below the running mean
+  // Scans slide along what hardly fixes them, a wall or a corridor. There, what carries a sensor brakes and jolts no
+  // harder than this.
+  static constexpr double kHardlyFixed = 0.1;  ///< share of all that fixes the position
+  static constexpr double kMostAcceleration_mps2 = 6.0, kJolt_m = 0.1;
+  static constexpr double kNarrowSearch_m = 0.3;  ///< where a wide search found what cannot be
   // The first scans of a sparse sensor meet few surfaces; those that they meet must fit.
   static constexpr int kFirstScans = 5;
   static constexpr double kFewestMatchedAtFirst = 0.1, kFittingAtFirst = 0.6;
@@ -54,6 +60,15 @@ std::vector<Eigen::Vector3f> in_map(const std::vector<Eigen::Vector3f>& points, 
   const Eigen::Isometry3f T = T_odom_lidar.cast<float>();
   std::transform(points.begin(), points.end(), moved.begin(), [&](const Eigen::Vector3f& p) { return T * p; });
   return moved;
+}
+
+// How far a step goes along the directions that the scan hardly fixes.
+double slid_m(const Matrix6& information, const Eigen::Vector3d& step) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(information.topLeftCorner<3, 3>());
+  const Eigen::Vector3d along = axes.eigenvectors().transpose() * step;
+  const Eigen::Array3d is_free =
+      (axes.eigenvalues().array() < Matching::kHardlyFixed * axes.eigenvalues().sum()).cast<double>();
+  return (is_free * along.array()).matrix().norm();
 }
 
 }  // namespace
@@ -139,10 +154,19 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
     icp.converged = icp.converged || (icp.information(0, 0) > 0.0 && icp.last_step_m < Matching::kSteady_m);
     return icp;
   };
-  const auto fits = [&](const IcpResult& icp) { return icp.converged && is_credible(icp.matched, icp.met); };
-  IcpResult icp = align(radius_m, T_predicted);
-  // A turn or a jolt that was not predicted, or the end of one. After a gap anything may fit somehow: nothing is tried.
   const double gap_s = stamp_s - last_stamp_s_;
+  const auto is_possible = [&](const IcpResult& icp) {
+    if (!motion_ || gap_s <= 0.0) return true;
+    const Pose surprise = (T_odom_lidar_ * T_predicted).inverse() * icp.T_target_source;
+    return slid_m(icp.information, surprise.translation()) <=
+           Matching::kJolt_m + 0.5 * Matching::kMostAcceleration_mps2 * gap_s * gap_s;
+  };
+  const auto fits = [&](const IcpResult& icp) {
+    return icp.converged && is_credible(icp.matched, icp.met) && is_possible(icp);
+  };
+  IcpResult icp = align(radius_m, T_predicted);
+  if (!is_possible(icp)) icp = align(std::min(radius_m, Matching::kNarrowSearch_m), T_predicted);
+  // A turn or a jolt that was not predicted, or the end of one. After a gap anything may fit somehow: nothing is tried.
   const bool follows = gap_s > 0.0 && gap_s <= Matching::kLongestGap_s;
   for (const double turn_deg : Matching::kTurnsTried_deg)
     for (const Pose& T_guess : {T_predicted, Pose(Pose::Identity())}) {
