@@ -66,10 +66,11 @@ struct SlamOptions {
 
 /// A drive that is simulated instead of read (docs/simulation.md).
 struct SimulationOptions {
-  std::string world = "town";     ///< town or warehouse
+  std::string world = "town";     ///< town, warehouse or building
   std::string sensor = "hdl64e";  ///< a row of the table of sensors
   std::string trajectory;         ///< pose file to drive along; empty: a drive of its own
   int seed = 1;
+  double difficulty = 0.0;        ///< how much changes and errs: 0 tame, 1 as the real world (docs/simulation.md)
   double length_m = 1000.0;       ///< of a drive of its own
   int frames = 0;                 ///< the first so many scans; 0: all of the drive
   double tilt_deg = 0.0;          ///< how far a sensor carried by hand leans, at most

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Kim and Kim, "Scan Context: Egocentric Spatial Descriptor for Place Recognition within 3D Point Cloud Map",
 // IROS 2018: 20 rings x 60 sectors up to 80 m, each cell the height of its highest point; the distance of two scans is
-// the mean cosine distance of their columns (eq. 6) at the best of all column shifts (eq. 7); the ring key, the share
-// of occupied cells a ring, finds those that are compared (section III-C).
+// the mean cosine distance of their columns (eq. 6) at the best of all column shifts (eq. 7); the ring key finds those
+// that are compared (section III-C). Two things as in the authors' program, with which its figures were reached:
+// heights count from a little below the ground, so that cells of bare ground are occupied, and the key is the mean
+// height of a ring (in the paper: the share of its cells that are occupied).
 #include <algorithm>
 #include <cmath>
 
@@ -14,6 +16,7 @@ namespace {
 
 constexpr int kRings = 20, kSectors = 60;
 constexpr float kMaxRange_m = 80.f;
+constexpr float kBelowGround_m = 0.27f;  // the program adds 2 m to the heights of a sensor 1.73 m above the ground
 
 class ScanContext final : public Baseline {
  public:
@@ -25,30 +28,28 @@ class ScanContext final : public Baseline {
                                    : "Kim and Kim, IROS 2018; the ten places of nearest ring key compared";
   }
 
-  // Columns of unit length, so that a cosine is one product; empty columns stay zero.
   Signature describe(std::span<const Point> points, double ground_z_m) const override {
     Signature image = Signature::Zero(kRings, kSectors);
-    const auto ground_z = static_cast<float>(ground_z_m);
+    const float lowest_m = static_cast<float>(ground_z_m) - kBelowGround_m;
     for (const Point& p : points) {
       const float range_m = std::hypot(p.x, p.y);
       if (range_m >= kMaxRange_m) continue;
       const int ring = static_cast<int>(range_m * kRings / kMaxRange_m);
       const float turns = (std::atan2(p.y, p.x) + static_cast<float>(kPi)) / static_cast<float>(2.0 * kPi);
       const int sector = std::min(static_cast<int>(turns * kSectors), kSectors - 1);
-      image(ring, sector) = std::max(image(ring, sector), p.z - ground_z);
+      image(ring, sector) = std::max(image(ring, sector), p.z - lowest_m);
     }
-    for (auto column : image.colwise())
-      if (!column.isZero()) column.normalize();
     return image;
   }
 
   double similarity(const Signature& query, const Signature& place) const override {
-    const Eigen::Matrix<float, kSectors, kSectors> cosines = query.transpose() * place;
-    Eigen::Array<bool, kSectors, 1> is_seen_by_query, is_seen_by_place;
-    for (int j = 0; j < kSectors; ++j) {
-      is_seen_by_query[j] = (query.col(j).array() > 0.f).any();
-      is_seen_by_place[j] = (place.col(j).array() > 0.f).any();
-    }
+    // Columns of unit length, so that a cosine is one product; empty columns stay zero.
+    const auto inverse_lengths = [](const Signature& image) {
+      return Eigen::VectorXf(image.colwise().norm().unaryExpr([](float n) { return n > 0.f ? 1.f / n : 0.f; }));
+    };
+    const Eigen::VectorXf query_scale = inverse_lengths(query), place_scale = inverse_lengths(place);
+    const Eigen::Matrix<float, kSectors, kSectors> cosines =
+        query_scale.asDiagonal() * (query.transpose() * place) * place_scale.asDiagonal();
     double best = 0.0;
     for (int shift = 0; shift < kSectors; ++shift) {
       // A cosine with an empty column is not defined: such pairs do not count.
@@ -57,7 +58,7 @@ class ScanContext final : public Baseline {
       for (int j = 0; j < kSectors; ++j) {
         const int k = j + shift < kSectors ? j + shift : j + shift - kSectors;
         sum += static_cast<double>(cosines(j, k));
-        columns += is_seen_by_query[j] && is_seen_by_place[k];
+        columns += query_scale[j] > 0.f && place_scale[k] > 0.f;
       }
       if (columns > 0) best = std::max(best, sum / columns);
     }
@@ -66,7 +67,7 @@ class ScanContext final : public Baseline {
 
   Eigen::VectorXf key(const Signature& image) const override {
     if (nearest_ring_keys_ == 0) return {};
-    return (image.array() > 0.f).cast<float>().rowwise().mean();
+    return image.rowwise().mean();
   }
   std::size_t nearest_keys() const override { return nearest_ring_keys_; }
 

@@ -139,14 +139,17 @@ void add_vehicle(Solids& out, const Stand& at, VehicleKind kind, std::uint64_t s
   Random random(seed);
   const std::uint64_t paint = random.next();
   const double length = kind == VehicleKind::kTruck      ? 8.0
+                        : kind == VehicleKind::kLorry    ? 13.0
                         : kind == VehicleKind::kVan      ? 5.4
                         : kind == VehicleKind::kForklift ? 2.6
                                                          : random.uniform(3.7, 4.9);
   const double width = kind == VehicleKind::kTruck      ? 2.5
+                       : kind == VehicleKind::kLorry    ? 2.5
                        : kind == VehicleKind::kVan      ? 2.0
                        : kind == VehicleKind::kForklift ? 1.2
                                                         : random.uniform(1.65, 1.85);
   const double height = kind == VehicleKind::kTruck      ? 3.4
+                        : kind == VehicleKind::kLorry    ? 3.9
                         : kind == VehicleKind::kVan      ? random.uniform(2.0, 2.7)
                         : kind == VehicleKind::kForklift ? 2.1
                                                          : random.uniform(1.4, 1.65);
@@ -167,6 +170,63 @@ void add_vehicle(Solids& out, const Stand& at, VehicleKind kind, std::uint64_t s
   if (kind != VehicleKind::kForklift)
     for (const double end : {-1.0, 1.0})  // the plates
       add(out, at, Shape::kBox, {end * (0.5 * length + 0.01), 0, 0.5}, {0.01, 0.26, 0.06}, Material::kRetro, seed);
+}
+
+void add_clutter(Solids& out, const Stand& at, std::uint64_t seed) {
+  Random random(seed);
+  switch (random.whole(0, 5)) {
+    case 0:
+    case 1: {  // bins
+      const int count = random.whole(1, 3);
+      for (int i = 0; i < count; ++i) {
+        Stand bin = at;
+        bin.x += 0.7 * (i - 0.5 * (count - 1)) * std::cos(at.yaw_rad);
+        bin.y += 0.7 * (i - 0.5 * (count - 1)) * std::sin(at.yaw_rad);
+        bin.yaw_rad += random.uniform(-0.4, 0.4);
+        add_box(out, bin, 0.58, 0.6, 0.0, random.uniform(1.0, 1.3), Material::kPlastic, random.next());
+      }
+      break;
+    }
+    case 2:  // a skip
+      add_box(out, at, random.uniform(1.8, 2.4), 1.0, 0.1, random.uniform(1.1, 1.6), Material::kMetal, random.next());
+      break;
+    case 3:  // a heap: earth, sand, snow
+      add(out, at, Shape::kEllipsoid, {0, 0, 0}, {random.uniform(0.7, 1.2), 0.5, random.uniform(0.5, 1.3)},
+          random.chance(0.5) ? Material::kEarth : Material::kMarking, random.next());
+      break;
+    case 4: {  // a scaffold
+      const double height_m = random.uniform(4.0, 8.0);
+      for (const double x : {-1.1, 0.0, 1.1})
+        for (const double y : {-0.4, 0.4})
+          add(out, at, Shape::kCylinder, {x, y, 0.5 * height_m}, {0.04, 0.04, 0.5 * height_m}, Material::kMetal, seed);
+      for (double z = 2.0; z < height_m; z += 2.0)
+        add_box(out, at, 2.4, 0.8, z, z + 0.08, Material::kWood, random.next());
+      break;
+    }
+    default:  // pallets, boxes, building material
+      add_box(out, at, random.uniform(0.8, 2.2), random.uniform(0.6, 1.0), 0.0, random.uniform(0.4, 1.8),
+              random.chance(0.5) ? Material::kWood : Material::kCardboard, random.next());
+  }
+}
+
+void add_furniture(Solids& out, const Stand& at, std::uint64_t seed) {
+  Random random(seed);
+  switch (random.whole(0, 3)) {
+    case 0:
+      add_box(out, at, random.uniform(0.4, 1.0), random.uniform(0.4, 0.7), 0.0, random.uniform(0.4, 1.4),
+              Material::kCardboard, random.next());
+      break;
+    case 1:
+      add_bush(out, at, random.uniform(0.8, 1.4), random.next());
+      break;
+    case 2:  // a chair
+      add_box(out, at, 0.45, 0.45, 0.42, 0.5, Material::kPlastic, seed);
+      add_box(out, {at.x + 0.2 * std::cos(at.yaw_rad), at.y + 0.2 * std::sin(at.yaw_rad), at.z, at.yaw_rad}, 0.05, 0.45,
+              0.5, 0.95, Material::kPlastic, seed);
+      break;
+    default:
+      add_post(out, at, random.uniform(0.6, 1.1), random.uniform(0.15, 0.3), Material::kMetal, random.next());
+  }
 }
 
 void add_person(Solids& out, const Stand& at, std::uint64_t seed) {

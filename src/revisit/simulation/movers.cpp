@@ -8,15 +8,15 @@
 
 namespace revisit::simulation_internal {
 
-void Movers::note_visits(const Path& path) {
-  constexpr double kInSight_m = 65.0, kAway_s = 8.0, kLook_s = 0.5;
+void Movers::note_visits(const Path& path, double in_sight_m) {
+  constexpr double kAway_s = 8.0, kLook_s = 0.5;
   for (ParkingSlot& slot : slots) {
     // Between two visits, the car changes while the sensor is farthest away.
     double last_near_s = -1.0, farthest_m = 0.0, farthest_s = 0.0;
     for (double time_s = 0.0; time_s <= path.duration_s(); time_s += kLook_s) {
       const Knot self = path.at(time_s);
       const double distance_m = std::hypot(self.x - slot.at.x, self.y - slot.at.y);
-      if (distance_m > kInSight_m) {
+      if (distance_m > in_sight_m) {
         if (distance_m > farthest_m) {
           farthest_m = distance_m;
           farthest_s = time_s;
@@ -31,11 +31,10 @@ void Movers::note_visits(const Path& path) {
   }
 }
 
-std::optional<std::uint64_t> parked_car(const ParkingSlot& slot, double time_s) {
+std::optional<std::uint64_t> occupant(const ParkingSlot& slot, double time_s) {
   const auto changes = std::upper_bound(slot.changes_s.begin(), slot.changes_s.end(), static_cast<float>(time_s));
   const auto visit = static_cast<std::uint64_t>(changes - slot.changes_s.begin());
-  // One car in three stays from visit to visit.
-  const std::uint64_t stays = uniform(mix(slot.seed, 1)) < 0.33f ? 0 : visit;
+  const std::uint64_t stays = static_cast<double>(uniform(mix(slot.seed, 1))) < slot.stays ? 0 : visit;
   const std::uint64_t key = mix(slot.seed, stays, 2);
   if (static_cast<double>(uniform(key)) >= slot.occupancy) return std::nullopt;
   return mix(key);

@@ -13,6 +13,8 @@ namespace revisit::simulation_internal {
 namespace {
 
 constexpr double kFalloffStep_m = 0.25;
+constexpr double kSeason_s = 100.0;     // in which foliage changes: longer than a place is in sight
+constexpr double kWeather_s = 150.0;    // in which rain, sun and wet surfaces come and go
 constexpr std::size_t kPoseKnots = 51;  // poses within a sweep, linear between them
 
 // A number of its own for each cell of space: what a surface looks like there, at every visit.
@@ -28,6 +30,7 @@ float texture(const Eigen::Vector3f& p, float cells_per_metre) {
 // Everything about one sweep that its beams share.
 struct Scanner::Sweep {
   double time_s = 0.0;
+  float clear = 1.f;  ///< how far is seen, of what is seen on a clear day
   std::uint64_t key = 0;
   std::vector<Eigen::Matrix<float, 3, 4>> T_world_lidar;  ///< of each column; one where nothing moves
   std::vector<float> cos_azimuth, sin_azimuth;            ///< of each column
@@ -48,12 +51,16 @@ Scanner::Scanner(const World& world, SensorModel sensor, const Options& options)
   for (double range_m = 0.0; range_m <= sensor_.max_range_m + 2 * kFalloffStep_m; range_m += kFalloffStep_m)
     falloff_.push_back(range_m > sensor_.focus_m ? std::pow(sensor_.focus_m / range_m, sensor_.falloff) : 1.0);
   for (std::size_t i = 0; i < lines; ++i) {
-    const double elevation = sensor_.rotates() ? to_radians(sensor_.elevations_deg[i]) : 0.0;
+    // All lines are off by the same, as the mounting or the maker's table is, and each by a little of its own.
+    const double error_deg = world.difficulty * static_cast<double>(0.12f * gaussian(mix(world.seed, 53)) +
+                                                                    0.03f * gaussian(mix(world.seed, 54, i)));
+    const double elevation = sensor_.rotates() ? to_radians(sensor_.elevations_deg[i] + error_deg) : 0.0;
     cos_elevation_.push_back(static_cast<float>(std::cos(elevation)));
     sin_elevation_.push_back(static_cast<float>(std::sin(elevation)));
     // Lines differ as built: the same at every sweep, another sensor another seed.
     gain_.push_back(std::max(0.3f, 1.f + static_cast<float>(sensor_.gain_spread) * gaussian(mix(world.seed, 51, i))));
-    bias_m_.push_back(static_cast<float>(sensor_.line_bias_m) * gaussian(mix(world.seed, 52, i)));
+    bias_m_.push_back(static_cast<float>(sensor_.line_bias_m * (1.0 + world.difficulty)) *
+                      gaussian(mix(world.seed, 52, i)));
   }
 }
 
@@ -91,9 +98,11 @@ Pose Scanner::T_local_lidar(double time_s) const {
   const double left = ground(0, kWheel_m), right = ground(0, -kWheel_m);
   double pitch = std::atan2(front - back, 2 * kAxle_m), roll = std::atan2(left - right, 2 * kWheel_m);
   double z = 0.25 * (front + back + left + right);
-  if (!world_.roads.points().empty()) {  // springs
-    pitch += to_radians(0.4) * smooth_noise(mix(world_.seed, 61), time_s / 0.9);
-    roll += to_radians(0.5) * smooth_noise(mix(world_.seed, 62), time_s / 1.1);
+  if (!world_.roads.points().empty()) {             // springs
+    const double shakes = 1.0 + world_.difficulty;  // and is loaded otherwise from drive to drive
+    pitch += to_radians(0.4) * shakes * smooth_noise(mix(world_.seed, 61), time_s / 0.9) +
+             to_radians(0.8) * world_.difficulty * smooth_noise(mix(world_.seed, 66), time_s / 9.0);
+    roll += to_radians(0.5) * shakes * smooth_noise(mix(world_.seed, 62), time_s / 1.1);
     z += 0.015 * smooth_noise(mix(world_.seed, 63), time_s / 0.7);
   }
   T.translate(Eigen::Vector3d(at.x, at.y, z));
@@ -158,7 +167,7 @@ Hit Scanner::look_at(const Sweep& sweep, const Ray& ray, const Met& met) const {
   return hit;
 }
 
-Scanner::Return Scanner::measure(const Ray& ray, const Met& met, const Hit& hit, std::size_t line,
+Scanner::Return Scanner::measure(const Ray& ray, const Met& met, const Hit& hit, std::size_t line, float clear,
                                  std::uint64_t key) const {
   const Surface& surface = surface_of(hit.material);
   const Eigen::Vector3f p = ray.origin + hit.range_m * ray.direction;
@@ -173,11 +182,12 @@ Scanner::Return Scanner::measure(const Ray& ray, const Met& met, const Hit& hit,
   if (met.what != Met::What::kMoving) strength *= 0.88f + 0.24f * texture(p, 2.f);
 
   // Weak answers get lost: sure to be seen well within the range, never beyond it.
-  const auto visible_m = static_cast<float>(sensor_.visible_10_percent_m);
+  const float visible_m = static_cast<float>(sensor_.visible_10_percent_m) * clear;
   const float margin = strength * 10.f * (visible_m / range_m) * (visible_m / range_m);
   const std::uint64_t dice = mix(key, 1);
   const float luck = static_cast<float>(dice >> 40) * 0x1p-24f, chance = static_cast<float>(dice & 0xffffff) * 0x1p-24f;
-  if (luck * 0.6f + 0.7f > margin || chance < static_cast<float>(sensor_.drop_out)) return {};
+  if (luck * 0.6f + 0.7f > margin || chance < static_cast<float>(sensor_.drop_out + 0.05 * world_.difficulty))
+    return {};
 
   const double measured_m =
       static_cast<double>(range_m + bias_m_[line] + static_cast<float>(sensor_.range_noise_m) * gaussian(mix(key, 2)));
@@ -197,6 +207,16 @@ Scanner::Return Scanner::measure(const Ray& ray, const Met& met, const Hit& hit,
   return result;
 }
 
+// A beam on an edge measures both of its sides: something in between.
+void Scanner::mix_at_edge(const Return& before, Return& here, std::uint64_t key) const {
+  constexpr float kNearest_m = 0.3f, kFarthest_m = 4.f;
+  const float step_m = std::abs(before.point.x - here.point.x);
+  if (!before.is_there || !here.is_there || step_m < kNearest_m || step_m > kFarthest_m) return;
+  const float dice = uniform(mix(key, 5)), share = static_cast<float>(0.3 * world_.difficulty);
+  if (dice >= share) return;
+  here.point.x += dice / share * (before.point.x - here.point.x);
+}
+
 // Beams that look down on the vehicle itself come back from too near. A sensor carried by hand has no roof below it.
 bool Scanner::meets_own_roof(const Eigen::Vector3f& direction) const {
   if (direction.z() >= 0.f || options_.tilt_deg > 0.0) return false;
@@ -207,6 +227,8 @@ bool Scanner::meets_own_roof(const Eigen::Vector3f& direction) const {
 
 void Scanner::cast(const Sweep& sweep, std::size_t first, std::size_t count, Return* returns) const {
   Met neighbour;
+  Return before;
+  const auto season = static_cast<float>(sweep.time_s / kSeason_s);
   std::array<Ray, RayScene::kPacket> rays;
   std::array<Met, RayScene::kPacket> mets;
   const auto columns = static_cast<std::size_t>(sensor_.columns);
@@ -218,7 +240,7 @@ void Scanner::cast(const Sweep& sweep, std::size_t first, std::size_t count, Ret
       in_lidar[i] = direction(sweep, line, column);
       const auto& T = sweep.T_world_lidar[sweep.T_world_lidar.size() == 1 ? 0 : column];
       rays[i] = {T.col(3), T.leftCols<3>() * in_lidar[i],
-                 options_.motion_distortion ? sweep.offset_s(column, sensor_) : 0.f};
+                 options_.motion_distortion ? sweep.offset_s(column, sensor_) : 0.f, season};
       mets[i] = expect(rays[i], neighbour);
     }
     scene_.trace(std::span(rays).first(size), mets.data());
@@ -227,9 +249,18 @@ void Scanner::cast(const Sweep& sweep, std::size_t first, std::size_t count, Ret
     for (std::size_t i = 0; i < size; ++i) {
       Return& result = returns[packet + i - first];
       result.is_there = false;
-      if (mets[i].what == Met::What::kNothing || meets_own_roof(in_lidar[i])) continue;
+      if (mets[i].what == Met::What::kNothing || meets_own_roof(in_lidar[i])) {
+        before.is_there = false;
+        continue;
+      }
       const std::size_t beam = packet + i;
-      result = measure(rays[i], mets[i], look_at(sweep, rays[i], mets[i]), beam / columns, mix(sweep.key, beam));
+      result = measure(rays[i], mets[i], look_at(sweep, rays[i], mets[i]), beam / columns, sweep.clear,
+                       mix(sweep.key, beam));
+      if (world_.difficulty > 0.0 && sensor_.rotates()) {
+        const Return unmixed = result;
+        mix_at_edge(before, result, mix(sweep.key, beam));
+        before = unmixed;
+      }
       const float range_m = result.point.x;
       result.point.x = range_m * in_lidar[i].x();
       result.point.y = range_m * in_lidar[i].y();
@@ -243,6 +274,8 @@ Scan Scanner::sweep(std::int64_t frame, double time_s) const {
   const double half_s = 0.5 * sensor_.sweep_s;
   Sweep sweep;
   sweep.time_s = time_s;
+  sweep.clear = static_cast<float>(
+      std::exp(-0.03 * world_.difficulty * (1.0 + smooth_noise(mix(world_.seed, 55), time_s / kWeather_s))));
   sweep.key = mix(world_.seed, 71, static_cast<std::uint64_t>(frame));
   sweep.moving = world_.movers.at(time_s, world_.path, [this](double x, double y) { return world_.stand_z(x, y); });
   if (!sweep.moving.empty()) sweep.scene = std::make_unique<RayScene>(scene_, sweep.moving, static_cast<float>(half_s));

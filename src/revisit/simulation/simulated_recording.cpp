@@ -53,10 +53,11 @@ Result<std::unique_ptr<SimulatedRecording>> simulate(const SimulationOptions& op
                                                      int threads) {
   const auto sensor = find_sensor_model(options.sensor);
   if (!sensor) return sensor.error();
-  if (options.world != "town" && options.world != "warehouse")
-    return Error{"simulation.world = '" + options.world + "' is not known; allowed: town, warehouse"};
-  auto world = options.world == "town" ? simulation_internal::build_town(options, log)
-                                       : simulation_internal::build_warehouse(options);
+  if (options.world != "town" && options.world != "warehouse" && options.world != "building")
+    return Error{"simulation.world = '" + options.world + "' is not known; allowed: town, warehouse, building"};
+  auto world = options.world == "town"        ? simulation_internal::build_town(options, log)
+               : options.world == "warehouse" ? simulation_internal::build_warehouse(options)
+                                              : simulation_internal::build_building(options);
   if (!world) return world.error();
 
   auto parts = std::make_unique<SimulatedRecording::Parts>(

@@ -281,7 +281,7 @@ std::string refusal(const SimulationOptions& options) {
 TEST(Simulation, UnknownNamesAreToldWithTheKnownOnes) {
   EXPECT_EQ(refusal(small("town", "hdl32")),
             "simulation.sensor = 'hdl32' is not known; allowed: hdl64e, vlp16, os0-128, rosette");
-  EXPECT_EQ(refusal(small("moon")), "simulation.world = 'moon' is not known; allowed: town, warehouse");
+  EXPECT_EQ(refusal(small("moon")), "simulation.world = 'moon' is not known; allowed: town, warehouse, building");
 }
 
 std::string drive_along(const std::string& rows) {

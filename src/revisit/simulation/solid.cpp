@@ -15,6 +15,7 @@ constexpr float kNone = std::numeric_limits<float>::infinity();
 
 struct LocalRay {
   Vector3f origin, direction;
+  float season;
   Vector3f at(float t) const { return origin + t * direction; }
 };
 
@@ -23,7 +24,8 @@ LocalRay to_local(const Solid& s, const Ray& ray) {
   const float y = ray.origin.y() - s.centre.y() - s.velocity.y() * ray.time_s;
   const Vector3f& d = ray.direction;
   return {{s.cos_yaw * x + s.sin_yaw * y, s.cos_yaw * y - s.sin_yaw * x, ray.origin.z() - s.centre.z()},
-          {s.cos_yaw * d.x() + s.sin_yaw * d.y(), s.cos_yaw * d.y() - s.sin_yaw * d.x(), d.z()}};
+          {s.cos_yaw * d.x() + s.sin_yaw * d.y(), s.cos_yaw * d.y() - s.sin_yaw * d.x(), d.z()},
+          ray.season};
 }
 
 Vector3f to_world(const Solid& s, const Vector3f& v) {
@@ -108,7 +110,8 @@ Span clip_to_cylinder(const LocalRay& ray, const Vector3f& half) {
   return span;
 }
 
-// Leaves: the space is cut into cells, some of which hold foliage, the same ones at every visit.
+// Leaves: the space is cut into cells, some of which hold foliage; some of them change with the seasons, each at a
+// time of its own, so that nothing changes in full view.
 float through_leaves(const Solid& solid, const LocalRay& ray, const Span& span, float limit_m) {
   constexpr float kStep = 0.17f, kCellsPerMetre = 4.f;
   const std::uint64_t seed = static_cast<std::uint64_t>(solid.object) << 32;
@@ -117,8 +120,10 @@ float through_leaves(const Solid& solid, const LocalRay& ray, const Span& span, 
     const Vector3f p = ray.at(t) * kCellsPerMetre;
     const auto x = as_key(floor_int(p.x()) + 512), y = as_key(floor_int(p.y()) + 512),
                z = as_key(floor_int(p.z()) + 512);
-    const std::uint64_t key = mix(seed ^ (x << 20) ^ (y << 10) ^ z);
-    if ((key & 0xff) < 64)
+    std::uint64_t key = mix(seed ^ (x << 20) ^ (y << 10) ^ z);
+    if (((key >> 16) & 0xff) < solid.changing)
+      key = mix(key, as_key(floor_int(ray.season + static_cast<float>((key >> 24) & 0xff) * (1.f / 256.f))));
+    if ((key & 0xff) < solid.filled)
       return std::max(span.enter, t - kStep * static_cast<float>((key >> 8) & 0xff) * (1.f / 256.f));
   }
   return kNone;

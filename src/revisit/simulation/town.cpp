@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include <revisit/core/pose.hpp>
 #include <revisit/simulation/internal/footprints.hpp>
@@ -79,9 +80,11 @@ class TownBuilder {
         Stand at = stand(r, side);
         at.x += random.uniform(-0.15, 0.15);
         at.yaw_rad += random.uniform(-0.03, 0.03) + (random.chance(0.1) ? kPi : 0.0);
-        world_.movers.slots.push_back({at, random.next(), random.uniform(0.4, 0.95), {}});
+        world_.movers.slots.push_back({at, random.next(), random.uniform(0.4, 0.95), stays(),
+                                       1.0 / 9.0 + 0.15 * world_.difficulty, 0.5 * world_.difficulty});
       }
     }
+    if (world_.difficulty > 0.0 && is_due(p, next_m[5])) clutter(p, side, next_m[5], random);
     if (is_due(p, next_m[1])) {
       const auto r = rectangle(p, edge(side) + side * 0.4, 0.25, 0.25);
       next_m[1] = arc_m + random.uniform(24.0, 33.0);
@@ -108,6 +111,18 @@ class TownBuilder {
     }
   }
 
+  // Of what stands beside the road, how much is still there at the next visit.
+  double stays() const { return 0.33 * std::max(0.0, 1.0 - world_.difficulty); }
+
+  // What is put down for some days, on the pavement or in a front garden.
+  void clutter(const LanePoint& p, int side, double& next_m, Random& random) {
+    next_m = static_cast<double>(p.arc_m) + random.uniform(4.0, 16.0) / world_.difficulty;
+    const auto r = rectangle(p, edge(side) + side * random.uniform(0.6, 3.5), 0.5, 1.2);
+    if (!claim(r)) return;
+    world_.movers.slots.push_back({stand(r, side), random.next(), random.uniform(0.2, 0.8), 0.5 * stays(), 0.0,
+                                   0.5 * world_.difficulty, ParkingSlot::For::kClutter});
+  }
+
   // The same tree every seven metres on both sides and nothing else: what one such stretch shows, all others do.
   void featureless(const LanePoint& p, int side, double* next_m) {
     if (!is_due(p, next_m[4])) return;
@@ -123,6 +138,7 @@ class TownBuilder {
     Random random = random_at(p, 10 + side);
     switch (district_at(world_, static_cast<double>(p.x), static_cast<double>(p.y))) {
       case District::kRows:
+        if (const auto row = row_of_twins(p, side)) random = Random(*row);
         return row_house(p, side, random, next_m[0]);
       case District::kDetached:
         return detached_house(p, side, random, next_m[0]);
@@ -137,6 +153,15 @@ class TownBuilder {
 
   static Material walls(Random& random) {
     return random.chance(0.6) ? Material::kPlaster : random.chance(0.6) ? Material::kBrick : Material::kConcrete;
+  }
+
+  // Streets of houses that are all alike: every one starts from the seed of its row.
+  std::optional<std::uint64_t> row_of_twins(const LanePoint& p, int side) const {
+    constexpr float kRow_m = 60.f;
+    const std::uint64_t row = mix(mix(world_.seed, 22, side > 0), as_key(floor_int(p.x / kRow_m) + 10000),
+                                  as_key(floor_int(p.y / kRow_m) + 10000));
+    if (static_cast<double>(uniform(row)) >= 0.3 * world_.difficulty) return std::nullopt;
+    return mix(world_.seed, 23, row);
   }
 
   void row_house(const LanePoint& p, int side, Random& random, double& next_m) {
@@ -295,8 +320,25 @@ Ground World::ground_at(float x, float y) const {
   return {is_marking ? Material::kMarking : Material::kAsphalt, 0.f};
 }
 
+namespace {
+
+// Leaves let beams through, and fall and grow again between visits; some trees are evergreen.
+void let_foliage_change(World& world) {
+  for (Solid& solid : world.solids) {
+    if (solid.shape != Shape::kCrown && solid.shape != Shape::kHedge) continue;
+    const float dice = uniform(mix(world.seed, 24, solid.object));
+    const double bare = std::min(1.0, world.difficulty) * static_cast<double>(dice);
+    solid.filled = static_cast<std::uint8_t>(64.0 * (1.0 - 0.75 * bare));
+    const double change = std::min(0.95, world.difficulty * (dice < 0.25f ? 0.25 : 0.8));
+    solid.changing = static_cast<std::uint8_t>(256.0 * change);
+  }
+}
+
+}  // namespace
+
 void populate_town(World& world, double traffic) {
   TownBuilder(world).build();
+  let_foliage_change(world);
   world.movers.note_visits(world.path);
   plan_traffic(world, traffic);
 }
@@ -318,7 +360,8 @@ Result<World> build_town(const SimulationOptions& options, const LogSink& log) {
   Terrain terrain(drive.path, kBuilt_m, hills_m, mix(seed, 2));
   drive.streets.insert(drive.streets.begin(), drive.path.knots());
   Roads roads(drive.streets, terrain);
-  World world{std::move(drive.path), std::move(terrain), std::move(roads), {}, {}, {}, seed, {}, origin};
+  World world{
+      std::move(drive.path), std::move(terrain), std::move(roads), {}, {}, {}, seed, options.difficulty, {}, origin};
   Random random(mix(seed, 3));
   for (double arc_m = 0.25 * std::min(world.path.length_m(), 1000.0); arc_m < world.path.length_m();
        arc_m += random.uniform(320.0, 700.0)) {

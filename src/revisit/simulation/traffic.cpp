@@ -25,12 +25,17 @@ class TrafficPlanner {
 
   // Every few seconds somebody is met; who would run into something is sent away.
   void plan(double traffic) {
+    const double alongside_until = 0.5 + 0.02 * world_.difficulty;
+    traffic *= 1.0 + 0.3 * world_.difficulty;
     for (double time_s = 3.0; time_s < world_.path.duration_s() && traffic > 0.0;
          time_s += random_.uniform(1.0, 5.0) / traffic) {
       const double kind = random_.uniform();
       constexpr int kTries = 12;
       for (int i = 0; i < kTries; ++i) {
-        const Mover mover = kind < 0.35 ? oncoming(time_s) : kind < 0.5 ? ahead(time_s) : on_foot(time_s);
+        const Mover mover = kind < 0.35              ? oncoming(time_s)
+                            : kind < 0.5             ? ahead(time_s)
+                            : kind < alongside_until ? alongside(time_s)
+                                                     : on_foot(time_s);
         if (!has_room(mover)) continue;
         world_.movers.movers.push_back(mover);
         break;
@@ -42,7 +47,9 @@ class TrafficPlanner {
   static constexpr double kOutOfSight_m = Movers::kNear_m + 10.0;
 
   VehicleKind any_vehicle() {
-    return random_.chance(0.75) ? VehicleKind::kCar : random_.chance(0.7) ? VehicleKind::kVan : VehicleKind::kTruck;
+    return random_.chance(0.75 - 0.2 * world_.difficulty) ? VehicleKind::kCar
+           : random_.chance(0.7)                          ? VehicleKind::kVan
+                                                          : VehicleKind::kTruck;
   }
   // There while it is within sight along the path, before and after the sensor passes it at `time_s`.
   Mover along(double time_s, double speed_mps) {
@@ -69,6 +76,16 @@ class TrafficPlanner {
     mover.from_s = time_s - 20.0;
     mover.until_s = time_s + 20.0;
     mover.arc_m = (random_.chance(0.7) ? 1.0 : -1.0) * random_.uniform(16.0, 40.0);
+    return mover;
+  }
+  // A lorry or a bus that drives beside the sensor for some seconds, and hides what lies behind it.
+  Mover alongside(double time_s) {
+    Mover mover = ahead(time_s);
+    mover.vehicle = random_.chance(0.6) ? VehicleKind::kLorry : VehicleKind::kTruck;
+    mover.from_s = time_s - 8.0;
+    mover.until_s = time_s + 8.0;
+    mover.arc_m = random_.uniform(-9.0, 12.0);
+    mover.left_m = random_.uniform(3.2, 3.8);
     return mover;
   }
   // To and fro on the pavement, while the sensor is in sight.

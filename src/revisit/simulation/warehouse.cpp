@@ -128,7 +128,8 @@ Result<World> build_warehouse(const SimulationOptions& options) {
   const Plan plan{random.whole(6, 8)};
   Path path(robot_drive(plan, options.length_m, random));
   Terrain terrain(path, plan.length() + 10.0, 0.0, 0);
-  World world{std::move(path), std::move(terrain), {}, {}, {}, {}, seed, {0.8, 0.35, 0.3}, Eigen::Vector3d::Zero()};
+  World world{std::move(path),  std::move(terrain),     {}, {}, {}, {}, seed, options.difficulty,
+              {0.8, 0.35, 0.3}, Eigen::Vector3d::Zero()};
   add_hall(world.solids, plan, mix(seed, 3));
   for (int rack = 0; rack <= plan.aisles; ++rack)
     add_rack(world.solids, rack * (kRack_m + kAisle_m) + 0.5 * kRack_m, mix(seed, 4, static_cast<std::uint64_t>(rack)));

@@ -37,11 +37,11 @@ TEST(World, ParkedCarsLineTheStreetsAndMostChangeBetweenVisits) {
       EXPECT_GT(nearest_m, 1.8) << "a car stands in the way";
       if (nearest_m > 12.0) continue;
       ++beside;
-      taken += parked_car(slot, 0.0).has_value();
+      taken += occupant(slot, 0.0).has_value();
       for (const float change_s : slot.changes_s) {
         ++revisited;
-        const auto before = parked_car(slot, static_cast<double>(change_s) - 0.1);
-        const auto after = parked_car(slot, static_cast<double>(change_s) + 0.1);
+        const auto before = occupant(slot, static_cast<double>(change_s) - 0.1);
+        const auto after = occupant(slot, static_cast<double>(change_s) + 0.1);
         changed += before != after;
       }
     }

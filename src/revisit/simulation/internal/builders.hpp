@@ -34,8 +34,12 @@ void add_post(Solids& out, const Stand& at, double height_m, double radius_m, Ma
 void add_box(Solids& out, const Stand& at, double length_m, double width_m, double bottom_m, double top_m,
              Material material, std::uint64_t seed);
 
-enum class VehicleKind : std::uint8_t { kCar, kVan, kTruck, kForklift };
+enum class VehicleKind : std::uint8_t { kCar, kVan, kTruck, kLorry, kForklift };
 void add_vehicle(Solids& out, const Stand& at, VehicleKind kind, std::uint64_t seed);
+/// What is put beside a road for some days: bins, a skip, a heap, a scaffold, a stack; within 2.4 x 1 m.
+void add_clutter(Solids& out, const Stand& at, std::uint64_t seed);
+/// What stands about in a building: a box, a plant, a chair, a bin; within 1 x 0.7 m.
+void add_furniture(Solids& out, const Stand& at, std::uint64_t seed);
 void add_person(Solids& out, const Stand& at, std::uint64_t seed);
 
 }  // namespace revisit::simulation_internal

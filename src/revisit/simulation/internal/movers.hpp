@@ -9,12 +9,17 @@
 
 namespace revisit::simulation_internal {
 
-/// A place where a car may be parked: another one, or none, at each visit.
+/// A place where something may stand, another one or none at each visit: a parked car, or what is put beside a road.
 struct ParkingSlot {
+  enum class For : std::uint8_t { kVehicle, kClutter, kDoor, kFurniture };
   Stand at;
   std::uint64_t seed = 0;
   double occupancy = 0.6;
-  std::vector<float> changes_s;  ///< when the car may have changed: while the sensor is far away, between two visits
+  double stays = 0.33;      ///< how likely what stands there does so at every visit
+  double vans = 1.0 / 9.0;  ///< share of the vehicles
+  double shifts_m = 0.0;    ///< along the slot, from visit to visit, at most
+  For use = For::kVehicle;
+  std::vector<float> changes_s = {};  ///< when it may have changed: while the sensor is far away, between two visits
 };
 
 /// Somebody who moves: along the path (with it, or against it), keeping a distance to the sensor's vehicle, or to and
@@ -39,8 +44,8 @@ class Movers {
   std::vector<ParkingSlot> slots;
   std::vector<Mover> movers;
 
-  /// To be called once all slots are there: finds when the path comes near each.
-  void note_visits(const Path& path);
+  /// To be called once all slots are there: finds when the path comes within sight of each.
+  void note_visits(const Path& path, double in_sight_m = 65.0);
   /// The solids of what is near the sensor at `time_s`, with their velocities. `ground` gives the height at (x, y).
   template <typename Ground>
   Solids at(double time_s, const Path& path, Ground ground) const;
@@ -50,8 +55,8 @@ class Movers {
 
 /// Where the mover is; absent while it is not there.
 std::optional<Knot> place_of(const Mover& mover, double time_s, const Path& path);
-/// Whether a car is parked in the slot, and which: a seed.
-std::optional<std::uint64_t> parked_car(const ParkingSlot& slot, double time_s);
+/// Whether something stands in the slot, and which: a seed.
+std::optional<std::uint64_t> occupant(const ParkingSlot& slot, double time_s);
 
 template <typename Ground>
 Solids Movers::at(double time_s, const Path& path, Ground ground) const {
@@ -62,8 +67,22 @@ Solids Movers::at(double time_s, const Path& path, Ground ground) const {
   Solids solids;
   for (const ParkingSlot& slot : slots) {
     if (!is_near(slot.at.x, slot.at.y)) continue;
-    if (const auto seed = parked_car(slot, time_s))
-      add_vehicle(solids, slot.at, *seed % 9 == 0 ? VehicleKind::kVan : VehicleKind::kCar, *seed);
+    const auto seed = occupant(slot, time_s);
+    if (!seed) continue;
+    Stand at = slot.at;
+    const double shift_m = slot.shifts_m * (2.0 * static_cast<double>(uniform(mix(*seed, 3))) - 1.0);
+    at.x += shift_m * std::cos(at.yaw_rad);
+    at.y += shift_m * std::sin(at.yaw_rad);
+    if (slot.use == ParkingSlot::For::kClutter)
+      add_clutter(solids, at, *seed);
+    else if (slot.use == ParkingSlot::For::kDoor)
+      add_box(solids, at, 1.0, 0.06, 0.0, 2.1, Material::kDoor, slot.seed);
+    else if (slot.use == ParkingSlot::For::kFurniture)
+      add_furniture(solids, at, *seed);
+    else
+      add_vehicle(solids, at,
+                  static_cast<double>(uniform(mix(*seed, 4))) < slot.vans ? VehicleKind::kVan : VehicleKind::kCar,
+                  *seed);
   }
   for (const Mover& mover : movers) {
     const auto here = place_of(mover, time_s, path);

@@ -38,7 +38,9 @@ class Scanner {
   };
   Eigen::Vector3f direction(const Sweep& sweep, std::size_t line, std::size_t column) const;
   void cast(const Sweep& sweep, std::size_t first, std::size_t count, Return* returns) const;
-  Return measure(const Ray& ray, const Met& met, const Hit& hit, std::size_t line, std::uint64_t key) const;
+  Return measure(const Ray& ray, const Met& met, const Hit& hit, std::size_t line, float clear,
+                 std::uint64_t key) const;
+  void mix_at_edge(const Return& before, Return& here, std::uint64_t key) const;
   Hit look_at(const Sweep& sweep, const Ray& ray, const Met& met) const;
   bool meets_own_roof(const Eigen::Vector3f& direction) const;
   double falloff_at(double range_m) const;

@@ -15,6 +15,7 @@ namespace revisit::simulation_internal {
 struct Ray {
   Eigen::Vector3f origin, direction;  ///< metres; unit length
   float time_s = 0.f;
+  float season = 0.f;  ///< foliage grows and falls: what changes does so once a season
 };
 
 struct Hit {
@@ -60,6 +61,7 @@ struct Solid {
   Shape shape = Shape::kBox;
   Material material = Material::kPlaster, top_material = Material::kPlaster;
   std::uint8_t facade = 0;
+  std::uint8_t filled = 64, changing = 0;  ///< of foliage, of 256 cells: those with leaves, those that seasons change
 };
 
 /// Where the ray meets the solid before `limit_m`, with `hit` filled in if it is given; infinity where it does not.

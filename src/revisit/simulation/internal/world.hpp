@@ -32,6 +32,7 @@ struct World {
   Movers movers;
   std::vector<Eigen::Vector2d> featureless;  ///< middles of stretches without features
   std::uint64_t seed = 0;
+  double difficulty = 0.0;  ///< docs/simulation.md
   Vehicle vehicle;
   /// What is added to give the coordinates that the user knows: inside, the drive starts near (0, 0, 0), so that floats
   /// hold every place to a tenth of a millimetre.
@@ -52,6 +53,9 @@ District district_at(const World& world, double x, double y);
 Result<World> build_town(const SimulationOptions& options, const LogSink& log);
 /// A hall with a robot that leaves its dock and comes back the same way.
 Result<World> build_warehouse(const SimulationOptions& options);
+
+/// Storeys that look alike, walked through with a sensor in the hands.
+Result<World> build_building(const SimulationOptions& options);
 
 /// A drive of `length_m` through a network of streets: blocks around which it goes twice, the same way and the other
 /// way, on either of two lanes. `streets` are all streets of the network near the drive.
