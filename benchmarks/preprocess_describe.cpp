@@ -137,7 +137,7 @@ void ground_segmentation_plain(benchmark::State& state) {
 
 void thin_for_registration(benchmark::State& state) {
   for (auto _ : state) {
-    const ThinCloud cloud = thin(bench_scan().points, {}, LearntWith::kVoxel_m);
+    const ThinCloud cloud = thin_for_registration(bench_scan().points, {});
     benchmark::DoNotOptimize(cloud.points.data());
   }
   set_counters(state);

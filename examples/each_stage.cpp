@@ -36,7 +36,7 @@ Described describe(revisit::Scan scan, revisit::IntensityScaleLearner& scale, co
   const double ground_z_m = revisit::ground_height_m(scan.points, ground.is_ground);
   Described described{revisit::describe(scan.points, parameters.descriptor, ground_z_m), {}};
   revisit::rotate(scan.points, revisit::upright_pose(up).inverse());
-  described.cloud = revisit::thin(scan.points, ground.is_ground, revisit::LearntWith::kVoxel_m);
+  described.cloud = revisit::thin_for_registration(scan.points, ground.is_ground);
   described.cloud.up = up;
   return described;
 }
@@ -63,8 +63,7 @@ int main(int argc, char** argv) {
 
   // Position and heading from overhead, both scans upright; then section III-D: registration and its evidence.
   revisit::OverheadSearch overhead(query.cloud);
-  const double yaw_reach_rad = revisit::kPi / parameters.descriptor.sectors + revisit::to_radians(3.0);
-  const auto seen = overhead.search(place.cloud, candidate.yaw_rad, yaw_reach_rad, 6);
+  const auto seen = overhead.search(place.cloud, candidate.yaw_rad, revisit::kPi, 12.0).front();
   std::printf("overhead: (%.0f, %.0f) m, %.0f degrees, overlap %.2f\n", seen.x_m, seen.y_m,
               revisit::to_degrees(seen.yaw_rad), seen.overlap);
   const revisit::Pose T_guess = revisit::upright_pose(place.cloud.up).inverse() *

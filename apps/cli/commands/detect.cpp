@@ -51,8 +51,8 @@ void count(RunFile& run, const Detection& detection) {
 class EvidenceFile {
  public:
   static constexpr const char* kHeader =
-      "query,match,inlier_ratio,inlier_share,free_space_agreement,intensity_agreement,rmse_m,overlap,horizon,"
-      "distance_m,log_odds,tx,ty,tz,qx,qy,qz,qw\n";
+      "query,match,inlier_ratio,inlier_share,free_space_agreement,intensity_agreement,rmse_m,overlap,"
+      "distance_m,least_fixed,voxel_m,inliers,log_odds,tx,ty,tz,qx,qy,qz,qw\n";
   explicit EvidenceFile(const std::filesystem::path& file) : file_(file.string()), stream_(file) {
     stream_ << kHeader << std::setprecision(10);
   }
@@ -64,8 +64,9 @@ class EvidenceFile {
       stream_ << detection.frame.value << ',' << each.match.value << ',' << e.inlier_ratio << ',' << e.inlier_share
               << ',' << e.free_space_agreement << ',';
       if (e.intensity_agreement) stream_ << *e.intensity_agreement;
-      for (const double value : {e.rmse_m, e.overlap, e.horizon, e.distance_m, each.evidence.log_odds, t.x(), t.y(),
-                                 t.z(), q.x(), q.y(), q.z(), q.w()})
+      for (const double value :
+           {e.rmse_m, e.overlap, e.distance_m, e.least_fixed, e.voxel_m, static_cast<double>(e.inliers),
+            each.evidence.log_odds, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()})
         stream_ << ',' << value;
       stream_ << '\n';
     }

@@ -51,10 +51,10 @@ struct GeometricOptions {
   int candidates = 3;              ///< how many of the top-K are registered, best first
   bool overhead_search = true;     ///< find position and heading from overhead before registering
   bool follow = true;              ///< predict the place from the last loops and odometry, and let these support it
-  double min_overlap = 0.4;        ///< of both images from overhead; candidates below are not registered
+  double min_overlap = 0.3;        ///< of both images from overhead; candidates below are not registered
   std::string features = "never";  ///< FPFH: never; fallback, where the yaw gave no loop; first, as the paper
-  double min_inlier_ratio = 0.4;   ///< share of the points above ground, both ways, that must be inliers
-  double min_probability = 0.95;   ///< that the pose is right (docs/accuracy.md); 0 never refuses
+  double min_inlier_ratio = 0.25;  ///< share of the points above ground, both ways, that must be inliers
+  double min_probability = 0.99;   ///< that the pose is right (docs/accuracy.md); 0 never refuses
 };
 
 /// Trajectory and map (docs/slam.md).

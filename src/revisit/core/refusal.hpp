@@ -15,7 +15,6 @@ struct Refusal {
     kTemporallyInconsistent,  ///< the frames before do not match (eq. 11)
     kFewInliers,
     kImprobable,
-    kNotConverged,
     kTooFar,  ///< the relative translation
   };
   Reason reason = Reason::kNoCandidate;

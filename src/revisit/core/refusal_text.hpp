@@ -27,8 +27,6 @@ inline std::string to_text(const Refusal& refusal) {
       return format("inlier ratio %.2f below %.2f", value, limit);
     case Reason::kImprobable:
       return format("probability %.3f below %.3f", value, limit);
-    case Reason::kNotConverged:
-      return "registration did not converge";
     case Reason::kTooFar:
       return format("translation %.1f m above %.1f m", value, limit);
   }

@@ -5,9 +5,15 @@
 #include <numeric>
 
 #include <revisit/core/stopwatch.hpp>
+#include <revisit/descriptors/similarity.hpp>
 #include <revisit/verification/loop_verification.hpp>
 
 namespace revisit {
+namespace {
+
+constexpr std::size_t kLearnsEvery = 4;  // queries: how much alike places are changes slowly
+
+}  // namespace
 
 Result<Detection> PlaceRecognition::find(const PreparedScan& query, std::size_t places,
                                          const TypicalAgreement& typical) {
@@ -27,8 +33,7 @@ Result<Detection> PlaceRecognition::find(const PreparedScan& query, std::size_t 
   detection.search_ms = watch.lap_ms();
   if (detection.candidates.empty())
     detection.refusal = Refusal{places == 0 ? Refusal::Reason::kNoSearchablePast : Refusal::Reason::kNoCandidate};
-  else if (const Status status = verify(query, typical, detection); !status)
-    return status.error();
+  if (const Status status = verify(query, typical, detection); !status) return status.error();
 
   recent_queries_.push_back({detection.frame, query.descriptor});
   if (recent_queries_.size() > kTemporalPairs) recent_queries_.pop_front();
@@ -39,21 +44,25 @@ Status PlaceRecognition::verify(const PreparedScan& query, const TypicalAgreemen
   Stopwatch watch;
   const VerificationQuery question{query.scan.frame, query.descriptor, query.cloud, query.geometry,
                                    query.trajectory_point};
-  const VerificationContext context{.parameters = parameters_,
-                                    .clouds = *clouds_,
-                                    .query_descriptor = [this](FrameId frame) -> std::optional<DescriptorView> {
-                                      const auto found =
-                                          std::find_if(recent_queries_.begin(), recent_queries_.end(),
-                                                       [&](const RecentQuery& each) { return each.frame == frame; });
-                                      if (found == recent_queries_.end()) return std::nullopt;
-                                      return found->descriptor;
-                                    },
-                                    .place_descriptor = [this](FrameId frame) { return index_.find(frame); },
-                                    .places = points_,
-                                    .following = following_,
-                                    .typical = typical,
-                                    .newest = index_.frame(detection.searchable_places - 1)};
+  const VerificationContext context{
+      .parameters = parameters_,
+      .clouds = *clouds_,
+      .query_descriptor = [this](FrameId frame) -> std::optional<DescriptorView> {
+        const auto found = std::find_if(recent_queries_.begin(), recent_queries_.end(),
+                                        [&](const RecentQuery& each) { return each.frame == frame; });
+        if (found == recent_queries_.end()) return std::nullopt;
+        return found->descriptor;
+      },
+      .place_descriptor = [this](FrameId frame) { return index_.find(frame); },
+      .places = points_,
+      .following = following_,
+      .typical = typical,
+      .look_alikes_log_odds = look_alikes_.log_odds(),
+      .newest = detection.candidates.empty() ? FrameId{} : index_.frame(detection.searchable_places - 1)};
   LoopVerification verification(context, question);
+  if (queries_++ % kLearnsEvery == 0 && parameters_.geometric.overhead_search)
+    if (const Status status = learn_look_alikes(query, verification.registration()); !status) return status;
+  if (detection.candidates.empty()) return ok();
   auto answer = verification.verify(detection.candidates);
   if (!answer) return answer.error();
   for (const Hypothesis& each : verification.hypotheses())
@@ -61,6 +70,27 @@ Status PlaceRecognition::verify(const PreparedScan& query, const TypicalAgreemen
   if (*answer) accept(query, **answer, verification.registration().query_geometry(), detection);
   detection.temporal_ms = verification.registration().temporal_ms();
   detection.geometric_ms = watch.lap_ms();
+  return ok();
+}
+
+// The place elsewhere that looks most like the scan, as retrieval would have it.
+Status PlaceRecognition::learn_look_alikes(const PreparedScan& query, CandidateRegistration& registration) {
+  if (!query.trajectory_point) return ok();
+  std::optional<FrameId> most_alike;
+  double best = 0.0;
+  for (const FrameId place : places_elsewhere(points_, *query.trajectory_point)) {
+    const auto descriptor = index_.find(place);
+    if (!descriptor) continue;
+    const double score = match_descriptors(query.descriptor, *descriptor).score();
+    if (most_alike && score <= best) continue;
+    most_alike = place;
+    best = score;
+  }
+  if (!most_alike) return ok();
+  const auto log_odds =
+      registration.log_odds_elsewhere(*most_alike, T_between(*points_.at(*most_alike), *query.trajectory_point));
+  if (!log_odds) return log_odds.error();
+  if (*log_odds) look_alikes_.add(**log_odds);
   return ok();
 }
 

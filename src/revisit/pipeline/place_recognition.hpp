@@ -7,7 +7,9 @@
 
 #include <revisit/pipeline/detection.hpp>
 #include <revisit/retrieval/place_index.hpp>
+#include <revisit/verification/candidate_registration.hpp>
 #include <revisit/verification/hypothesis.hpp>
+#include <revisit/verification/look_alikes.hpp>
 #include <revisit/verification/loop_following.hpp>
 #include <revisit/verification/place_clouds.hpp>
 
@@ -32,6 +34,7 @@ class PlaceRecognition {
 
  private:
   Status verify(const PreparedScan& query, const TypicalAgreement& typical, Detection& detection);
+  Status learn_look_alikes(const PreparedScan& query, CandidateRegistration& registration);
   void accept(const PreparedScan& query, Hypothesis& answer, const ScanGeometry& query_geometry, Detection& detection);
 
   Parameters parameters_;
@@ -39,6 +42,8 @@ class PlaceRecognition {
   std::unique_ptr<PlaceClouds> clouds_;
   TrajectoryPoints points_;  ///< of all places
   LoopFollowing following_;
+  LookAlikes look_alikes_;
+  std::size_t queries_ = 0;
   struct RecentQuery {
     FrameId frame;
     IntensityScanContext descriptor;

@@ -58,7 +58,7 @@ Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const
   if (prepared.descriptor.occupied_cells() < LayerConstants::kFewestCells) return describes_no_place(prepared);
 
   rotate(points, T_upright_lidar.inverse());
-  prepared.cloud = thin(points, prepared.ground.is_ground, LearntWith::kVoxel_m);
+  prepared.cloud = thin_for_registration(points, prepared.ground.is_ground);
   prepared.cloud.up = up;
   prepared.ms.thin = watch.lap_ms();
   return prepared;

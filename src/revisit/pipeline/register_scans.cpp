@@ -1,32 +1,63 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/pipeline/register_scans.hpp>
 
-#include <revisit/pipeline/place_recognition.hpp>
+#include <algorithm>
+#include <vector>
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <revisit/pipeline/prepare.hpp>
+#include <revisit/registration/overhead_search.hpp>
+#include <revisit/verification/acceptance.hpp>
+#include <revisit/verification/geometric.hpp>
 
 namespace revisit {
+namespace {
 
-// The target as the only place of a map, and the source as the query.
+constexpr double kReach_m = 12.0;   // scans farther apart share too little
+constexpr std::size_t kStarts = 6;  // poses from overhead that are registered
+// Who asks how two scans lie to each other believes that they show one place; of candidates for a loop nearly all do
+// not.
+constexpr double kPrior_log_odds = 4.0;
+
+// Every heading and position seen from overhead; the ones that share most are registered, the surest is the answer.
+GeometricEvidence register_without_guess(const ThinCloud& target_cloud, const ThinCloud& source_cloud,
+                                         const ScanGeometry& target, const ScanGeometry& source,
+                                         const GeometricOptions& options) {
+  OverheadSearch search(source_cloud);
+  const auto starts = search.search(target_cloud, 0.0, kPi, kReach_m, kStarts);
+  std::vector<GeometricEvidence> found(starts.size());
+  tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
+    CandidateView view;
+    view.T_guess_match_query = upright_pose(target_cloud.up).inverse() *
+                               planar_pose(starts[i].x_m, starts[i].y_m, starts[i].yaw_rad) *
+                               upright_pose(source_cloud.up);
+    view.overlap = starts[i].overlap;
+    found[i] = check_geometric(target, source, view, options);
+    decide(found[i], 0.0, kPrior_log_odds, options);
+  });
+  return *std::max_element(found.begin(), found.end(),
+                           [](const auto& a, const auto& b) { return a.log_odds < b.log_odds; });
+}
+
+}  // namespace
+
 Result<Registration> register_scans(const Scan& source, const Scan& target, const Parameters& parameters) {
   if (const Status status = validate(parameters); !status) return status.error();
   ScanPreparation preparation(parameters, std::nullopt, {}, {});
-  auto place = preparation.prepare(target), query = preparation.prepare(source);
+  const auto place = preparation.prepare(target), query = preparation.prepare(source);
   for (const auto* each : {&place, &query})
     if (!*each) return each->error();
-  place->scan.frame = FrameId{0};
-  query->scan.frame = FrameId{1};
-  PlaceRecognition recognition(parameters, clouds_in_memory());
-  if (const Status status = recognition.add(*std::move(place)); !status) return status.error();
-  const auto detection = recognition.find(*query, 1, {});
-  if (!detection) return detection.error();
+  const ScanGeometry match(place->cloud), scan(query->cloud);
+  GeometricEvidence found = register_without_guess(place->cloud, query->cloud, match, scan, parameters.geometric);
+  if (found.is_consistent()) refine(found, match, scan);
   Registration result;
-  result.refusal = detection->refusal;
-  if (const auto& found = detection->geometric) {
-    result.T_target_source = found->T_match_query;
-    result.information = found->information;
-    result.probability = found->probability;
-    result.inlier_ratio = found->evidence.inlier_ratio;
-    result.rmse_m = found->evidence.rmse_m;
-  }
+  result.refusal = found.refusal;
+  result.T_target_source = found.T_match_query;
+  result.information = found.information;
+  result.probability = found.probability;
+  result.inlier_ratio = found.evidence.inlier_ratio;
+  result.rmse_m = found.evidence.rmse_m;
   return result;
 }
 

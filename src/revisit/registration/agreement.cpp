@@ -12,8 +12,8 @@ namespace revisit {
 namespace {
 
 struct Measures {
-  static constexpr float kSeenMargin_m = 1.f;       ///< what ranges within a cell of seen space may be off
   static constexpr double kReach = 2.5;             ///< in-plane distance to the nearest centroid, in inlier distances
+  static constexpr double kSeenMargin = 2.5;        ///< what ranges within a cell of seen space may be off, likewise
   static constexpr double kVisibleShare = 0.95;     ///< of the points, the nearest: beyond, the other scan sees little
   static constexpr std::size_t kFewestPoints = 50;  ///< of fewer, nothing can be said
 };
@@ -33,12 +33,25 @@ struct DirectionalAgreement {
   Correlation intensities;
   std::size_t visible = 0, inliers = 0, seen_through = 0;
   double squared_sum = 0.0;
+  Eigen::Matrix3d normals = Eigen::Matrix3d::Zero();  // sum of n n^T over the inliers
+
+  double ratio() const {
+    return visible < Measures::kFewestPoints ? 0.0 : static_cast<double>(inliers) / static_cast<double>(visible);
+  }
+  // Of the directions at right angles to `up`, the mean square of the normals along the one where it is least.
+  double least_fixed(const Eigen::Vector3d& up) const {
+    if (inliers == 0) return 0.0;
+    const Eigen::Vector3d x = up.unitOrthogonal(), y = up.cross(x);
+    const double xx = x.dot(normals * x), yy = y.dot(normals * y), xy = x.dot(normals * y);
+    return (0.5 * (xx + yy) - std::sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy)) / static_cast<double>(inliers);
+  }
 };
 
 // The share of the points above ground of `from` that lie on a surface of `to`.
 DirectionalAgreement agreement_one_way(const SurfaceCloud& to, const SurfaceCloud& from, const Pose& T_to_from,
                                        double inlier_distance_m, double farthest_m) {
   DirectionalAgreement result;
+  const auto seen_margin_m = static_cast<float>(Measures::kSeenMargin * inlier_distance_m);
   const auto reach2 = static_cast<float>(std::pow(Measures::kReach * inlier_distance_m, 2));
   for (std::size_t i = 0; i < from.size(); ++i) {
     if (from.is_ground(i)) continue;
@@ -47,17 +60,19 @@ DirectionalAgreement agreement_one_way(const SurfaceCloud& to, const SurfaceClou
     ++result.visible;
     const auto neighbour = to.nearest(p.cast<float>(), reach2);
     double distance = std::numeric_limits<double>::infinity();
+    Eigen::Vector3d n = Eigen::Vector3d::Zero();
     if (neighbour) {
-      const Eigen::Vector3d n = to.normal(neighbour->index).cast<double>();
+      n = to.normal(neighbour->index).cast<double>();
       const Eigen::Vector3d d = p - to.point(neighbour->index).cast<double>();
       distance = n.squaredNorm() < 0.5 ? d.norm() : std::abs(n.dot(d));
     }
     if (distance <= inlier_distance_m) {
       ++result.inliers;
+      result.normals.noalias() += n * n.transpose();
       result.intensities.add(static_cast<double>(from.intensity(i)),
                              static_cast<double>(to.intensity(neighbour->index)));
       result.squared_sum += distance * distance;
-    } else if (to.seen().look(p.cast<float>(), Measures::kSeenMargin_m) == SeenSpace::Verdict::kThrough) {
+    } else if (to.seen().look(p.cast<float>(), seen_margin_m) == SeenSpace::Verdict::kThrough) {
       ++result.seen_through;
     }
   }
@@ -84,11 +99,11 @@ Agreement measure_agreement(const SurfaceCloud& target, const SurfaceCloud& sour
   tbb::parallel_invoke(
       [&] { forth = agreement_one_way(target, source, T_target_source, inlier_distance_m, target_range); },
       [&] { back = agreement_one_way(source, target, T_target_source.inverse(), inlier_distance_m, source_range); });
-  const auto ratio = [](const DirectionalAgreement& a) {
-    return a.visible < Measures::kFewestPoints ? 0.0 : static_cast<double>(a.inliers) / static_cast<double>(a.visible);
-  };
   Agreement result;
-  result.inlier_ratio = std::min(ratio(forth), ratio(back));
+  result.inlier_ratio = std::min(forth.ratio(), back.ratio());
+  result.least_fixed =
+      std::min(forth.least_fixed(target.up().cast<double>()), back.least_fixed(source.up().cast<double>()));
+  result.inliers = std::min(forth.inliers, back.inliers);
   const auto undisputed = [](const DirectionalAgreement& a) {
     const std::size_t known = a.inliers + a.seen_through;
     return known == 0 ? 0.0 : static_cast<double>(a.inliers) / static_cast<double>(known);

@@ -17,6 +17,10 @@ struct Agreement {
   std::optional<double> intensity_correlation;  ///< smaller of both directions, of inliers and the points they lie on;
                                                 ///< none where intensities are all alike
   double rmse_m = 0.0;                          ///< point-to-plane, over the inliers above ground of both directions
+  /// How well the inliers' surfaces fix the position in the horizontal direction that they fix least: the mean square
+  /// of their normals along it, in [0, 0.5]. Along a bare wall 0: a pose may slide there.
+  double least_fixed = 0.0;
+  std::size_t inliers = 0;  ///< smaller of both directions
 };
 Agreement measure_agreement(const SurfaceCloud& target, const SurfaceCloud& source, const Pose& T_target_source,
                             double inlier_distance_m);

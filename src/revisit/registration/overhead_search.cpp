@@ -15,6 +15,14 @@ constexpr int kSteps = 120;  // of the heading, to a whole turn
 constexpr double kStep_rad = 2.0 * kPi / kSteps;
 constexpr std::size_t kWordsARow = kSide / 64;
 
+struct Coarse {
+  static constexpr int kSteps = 2, kCells = 2;
+};
+// What lies so far away is still the same answer.
+struct Beside {
+  static constexpr int kSteps = 4, kCells = 3;
+};
+
 void count(OverheadImage& image) {
   image.count = 0;
   for (const std::uint64_t word : image.bits) image.count += static_cast<std::size_t>(std::popcount(word));
@@ -63,9 +71,10 @@ std::uint64_t common(const OverheadImage& fixed, const OverheadImage& moving, in
 
 }  // namespace
 
-OverheadImage overhead_image(const ThinCloud& cloud, double yaw_rad) {
+OverheadImage overhead_image(const ThinCloud& cloud, double cell_m, double yaw_rad) {
   OverheadImage image;
-  const Eigen::Matrix3f turn = (planar_pose(0.0, 0.0, yaw_rad) * upright_pose(cloud.up)).linear().cast<float>();
+  const Eigen::Matrix3f turn =
+      ((planar_pose(0.0, 0.0, yaw_rad) * upright_pose(cloud.up)).linear() / cell_m).cast<float>();
   constexpr float kMiddle = 0.5f * kSide;
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
     if (cloud.is_ground[i] != 0) continue;
@@ -79,44 +88,81 @@ OverheadImage overhead_image(const ThinCloud& cloud, double yaw_rad) {
   return image;
 }
 
-const OverheadSearch::Turned& OverheadSearch::turned(int step, int reach_m) {
+const OverheadSearch::Turned& OverheadSearch::turned(int step) {
   auto [found, is_new] = turns_.try_emplace((step % kSteps + kSteps) % kSteps);
-  Turned& turned = found->second;
-  if (is_new) turned.image = overhead_image(query_, found->first * kStep_rad);
-  if (turned.moved_along_x.size() != 2 * static_cast<std::size_t>(reach_m) + 1) {
-    turned.moved_along_x.clear();
-    for (int x = -reach_m; x <= reach_m; ++x) turned.moved_along_x.push_back(moved_along_x(turned.image, x));
-  }
-  return turned;
+  if (is_new) found->second.image = overhead_image(query_, cell_m_, found->first * kStep_rad);
+  return found->second;
 }
 
-OverheadMatch OverheadSearch::search(const ThinCloud& match, double yaw_rad, double yaw_reach_rad, int reach_m) {
-  const OverheadImage place = overhead_image(match), place_grown = grown(place);
-  OverheadMatch best;
-  best.yaw_rad = yaw_rad;
-  std::uint64_t most = 0;
-  const auto nearest = static_cast<int>(std::lround(yaw_rad / kStep_rad));
-  const auto reach = static_cast<int>(std::floor(yaw_reach_rad / kStep_rad + 1e-9));
-  const Turned* best_turn = nullptr;
-  for (int step = nearest - reach; step <= nearest + reach; ++step) {
-    const Turned& query = turned(step, reach_m);
-    for (int x = -reach_m; x <= reach_m; ++x)
-      for (int y = -reach_m; y <= reach_m; ++y) {
-        const std::uint64_t shared = common(
-            place_grown, query.moved_along_x[static_cast<std::size_t>(x) + static_cast<std::size_t>(reach_m)], y);
-        if (shared <= most) continue;
-        most = shared;
-        best_turn = &query;
-        best = {wrap_angle(step * kStep_rad), x * OverheadImage::kCell_m, y * OverheadImage::kCell_m, 0.0};
+const OverheadImage& OverheadSearch::moved(int step, int x) {
+  auto& turn = turns_.at((step % kSteps + kSteps) % kSteps);
+  auto [found, is_new] = turn.moved_along_x.try_emplace(x);
+  if (is_new) found->second = moved_along_x(turn.image, x);
+  return found->second;
+}
+
+// The overlap, both ways round: the query on the place's grown image, of which `shared` are common, and the other way.
+OverheadMatch OverheadSearch::match_at(const OverheadImage& place, const At& at) {
+  const OverheadImage& query = turned(at.step).image;
+  const std::uint64_t back = common(place, grown(moved(at.step, at.x)), at.y);
+  return {wrap_angle(at.step * kStep_rad), at.x * cell_m_, at.y * cell_m_,
+          std::min(static_cast<double>(at.shared) / static_cast<double>(std::max<std::size_t>(1, query.count)),
+                   static_cast<double>(back) / static_cast<double>(std::max<std::size_t>(1, place.count)))};
+}
+
+// The best of `at` and all that lie one step beside it.
+OverheadSearch::At OverheadSearch::climb(const OverheadImage& place_grown, const At& at) {
+  At best = at;
+  for (int step = at.step - 1; step <= at.step + 1; ++step) {
+    turned(step);
+    for (int x = at.x - 1; x <= at.x + 1; ++x)
+      for (int y = at.y - 1; y <= at.y + 1; ++y) {
+        const auto shared = static_cast<std::uint32_t>(common(place_grown, moved(step, x), y));
+        if (shared > best.shared) best = {step, x, y, shared};
       }
   }
-  if (best_turn == nullptr || place.count == 0) return best;
-  // The other way round: the place on the query's grown image.
-  const OverheadImage query_grown = grown(moved_along_x(best_turn->image, static_cast<int>(best.x_m)));
-  const std::uint64_t back = common(place, query_grown, static_cast<int>(best.y_m));
-  best.overlap = std::min(static_cast<double>(most) / static_cast<double>(best_turn->image.count),
-                          static_cast<double>(back) / static_cast<double>(place.count));
   return best;
+}
+
+std::vector<OverheadMatch> OverheadSearch::search(const ThinCloud& match, double yaw_rad, double yaw_reach_rad,
+                                                  double reach_m, std::size_t wanted) {
+  const auto cell_m = static_cast<double>(std::max(match.voxel_m, query_.voxel_m));
+  if (cell_m != cell_m_) turns_.clear();
+  cell_m_ = cell_m;
+  const OverheadImage place = overhead_image(match, cell_m), place_grown = grown(place);
+  const int reach_cells = static_cast<int>(std::lround(reach_m / cell_m));
+  const auto nearest = static_cast<int>(std::lround(yaw_rad / kStep_rad));
+  const int reach = std::min(static_cast<int>(std::floor(yaw_reach_rad / kStep_rad + 1e-9)), kSteps / 2);
+  // Images are grown by a cell, so that every other heading and cell shows where to look closely.
+  coarse_.clear();
+  for (int step = nearest - reach; step <= nearest + reach; step += Coarse::kSteps) {
+    turned(step);
+    for (int x = -reach_cells; x <= reach_cells; x += Coarse::kCells) {
+      const OverheadImage& query = moved(step, x);
+      for (int y = -reach_cells; y <= reach_cells; y += Coarse::kCells)
+        coarse_.push_back({step, x, y, static_cast<std::uint32_t>(common(place_grown, query, y))});
+    }
+  }
+  std::vector<At> found;
+  while (found.size() < std::max<std::size_t>(1, wanted)) {
+    const At most =
+        *std::max_element(coarse_.begin(), coarse_.end(), [](const At& a, const At& b) { return a.shared < b.shared; });
+    if (most.shared == 0) break;
+    found.push_back(climb(place_grown, most));
+    for (At& each : coarse_)  // what lies beside is the same answer
+      if (is_beside(each, most)) each.shared = 0;
+  }
+  std::stable_sort(found.begin(), found.end(), [](const At& a, const At& b) { return a.shared > b.shared; });
+  std::vector<OverheadMatch> matches;
+  for (const At& each : found) matches.push_back(match_at(place, each));
+  if (matches.empty()) matches.push_back({wrap_angle(yaw_rad), 0.0, 0.0, 0.0});
+  return matches;
+}
+
+bool OverheadSearch::is_beside(const At& a, const At& b) {
+  const int apart = std::abs(a.step - b.step) % kSteps;
+  return std::min(apart, kSteps - apart) <= Beside::kSteps && std::abs(a.x - b.x) <= Beside::kCells &&
+         std::abs(a.y - b.y) <= Beside::kCells;
 }
 
 }  // namespace revisit

@@ -28,7 +28,7 @@ TEST(OverheadSearch, FindsPositionAndHeading) {
     const ThinCloud b = thin_scan(world, T_b, 2);
     OverheadSearch search(b);
     // From a heading 7 degrees off.
-    const OverheadMatch found = search.search(a, to_radians(yaw_deg - 7.0), to_radians(9.0), 6);
+    const OverheadMatch found = search.search(a, to_radians(yaw_deg - 7.0), to_radians(9.0), 6).front();
     const Pose T_truth = T_a.inverse() * T_b;
     const Pose T_error = T_truth.inverse() * planar_pose(found.x_m, found.y_m, found.yaw_rad);
     EXPECT_LT(T_error.translation().head<2>().norm(), 1.5) << yaw_deg;
@@ -41,17 +41,17 @@ TEST(OverheadSearch, AnotherPlaceOverlapsLess) {
   const Pose T = SyntheticWorld::at(0, 0, 0);
   const ThinCloud a = thin_scan(SyntheticWorld(31), T, 1), other = thin_scan(SyntheticWorld(32), T, 2);
   OverheadSearch search(a);
-  EXPECT_GT(search.search(a, 0.0, 0.1, 3).overlap, 0.99);
-  EXPECT_LT(search.search(other, 0.0, to_radians(9.0), 6).overlap, 0.6);
+  EXPECT_GT(search.search(a, 0.0, 0.1, 3).front().overlap, 0.99);
+  EXPECT_LT(search.search(other, 0.0, to_radians(9.0), 6).front().overlap, 0.6);
 }
 
 TEST(OverheadSearch, OfNothingFindsNothing) {
   const ThinCloud nothing;
   const ThinCloud a = thin_scan(SyntheticWorld(31), SyntheticWorld::at(0, 0, 0), 1);
   OverheadSearch of_nothing(nothing), of_a(a);
-  EXPECT_EQ(of_nothing.search(a, 0.0, 0.1, 3).overlap, 0.0);
-  EXPECT_EQ(of_a.search(nothing, 0.3, 0.1, 3).overlap, 0.0);
-  EXPECT_EQ(overhead_image(nothing).count, 0u);
+  EXPECT_EQ(of_nothing.search(a, 0.0, 0.1, 3).front().overlap, 0.0);
+  EXPECT_EQ(of_a.search(nothing, 0.3, 0.1, 3).front().overlap, 0.0);
+  EXPECT_EQ(overhead_image(nothing, 1.0).count, 0u);
 }
 
 }  // namespace

@@ -31,7 +31,10 @@ struct ThinCloud {
 /// together. `is_ground` has one entry a point or is empty (nothing is ground). Throws std::invalid_argument for no
 /// voxel size.
 ThinCloud thin(std::span<const Point> points, std::span<const std::uint8_t> is_ground, double voxel_m);
-/// The same without the space that was seen.
+/// Thins with the voxels that registration works on: 1 m, or half of it where a scan fills so few of them, as indoors,
+/// that they show little of the place.
+ThinCloud thin_for_registration(std::span<const Point> points, std::span<const std::uint8_t> is_ground);
+/// The same as thin() without the space that was seen.
 ThinCloud thin_surfaces(std::span<const Point> points, std::span<const std::uint8_t> is_ground, double voxel_m);
 
 /// A thin cloud with what registration needs of it: normals and neighbours. Safe to share between threads.
@@ -49,6 +52,8 @@ class SurfaceCloud final : public Surface {
   /// Unit normal, sign arbitrary; zero where the neighbours are fewer than five or on one line.
   const Eigen::Vector3f& normal(std::size_t i) const { return normals_[i]; }
   bool is_ground(std::size_t i) const { return cloud_.is_ground[i] != 0; }
+  const Eigen::Vector3f& up() const { return cloud_.up; }
+  double voxel_m() const { return static_cast<double>(cloud_.voxel_m); }
   float intensity(std::size_t i) const { return cloud_.intensity[i]; }
   const SeenSpace& seen() const { return cloud_.seen; }
 

@@ -46,6 +46,16 @@ ThinCloud thin(std::span<const Point> points, std::span<const std::uint8_t> is_g
   return cloud;
 }
 
+ThinCloud thin_for_registration(std::span<const Point> points, std::span<const std::uint8_t> is_ground) {
+  constexpr double kVoxel_m = 1.0, kSmall_m = 0.5;
+  constexpr std::size_t kFewest = 1500;  // streets fill 1,800 to 5,000, rooms and halls 50 to 1,400
+  ThinCloud cloud = thin(points, is_ground, kVoxel_m);
+  if (cloud.points.size() >= kFewest) return cloud;
+  ThinCloud fine = thin_surfaces(points, is_ground, kSmall_m);
+  fine.seen = std::move(cloud.seen);
+  return fine;
+}
+
 ThinCloud thin_surfaces(std::span<const Point> points, std::span<const std::uint8_t> is_ground, double voxel_m) {
   if (!(voxel_m > 0.0)) throw std::invalid_argument("voxels of " + std::to_string(voxel_m) + " m; allowed: above 0");
   ThinCloud cloud;

@@ -13,7 +13,6 @@ std::optional<Refusal> refusal_of(const GeometricEvidence& found, const Geometri
     return Refusal{Reason::kFewInliers, evidence.inlier_ratio, options.min_inlier_ratio};
   if (found.probability < options.min_probability)
     return Refusal{Reason::kImprobable, found.probability, options.min_probability};
-  if (!found.has_converged) return Refusal{Reason::kNotConverged};
   if (evidence.distance_m > kMostTranslation_m)
     return Refusal{Reason::kTooFar, evidence.distance_m, kMostTranslation_m};
   return std::nullopt;
@@ -21,8 +20,10 @@ std::optional<Refusal> refusal_of(const GeometricEvidence& found, const Geometri
 
 }  // namespace
 
-void decide(GeometricEvidence& found, double prior_log_odds, const GeometricOptions& options) {
-  found.log_odds = loop_log_odds(found.evidence) + prior_log_odds;
+void decide(GeometricEvidence& found, double of_recording_log_odds, double prior_log_odds,
+            const GeometricOptions& options) {
+  found.own_log_odds = loop_log_odds(found.evidence) + of_recording_log_odds;
+  found.log_odds = found.own_log_odds + prior_log_odds;
   found.probability = probability_of(found.log_odds);
   found.refusal = refusal_of(found, options);
 }

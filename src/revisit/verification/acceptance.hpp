@@ -6,8 +6,11 @@
 
 namespace revisit {
 
-/// What accepts a loop, and what refuses it: inliers, then the probability of all evidence together with the prior,
-/// convergence and distance. The prior, in log odds, is the support of the loops before (LoopFollowing); 0 without.
-void decide(GeometricEvidence& found, double prior_log_odds, const GeometricOptions& options);
+/// What accepts a loop, and what refuses it: inliers, then the probability of all evidence together with the prior, and
+/// distance. Its own
+/// evidence counts with what the recording adds to it (LookAlikes); the prior is the support of the loops before
+/// (LoopFollowing). Both in log odds, 0 where there is none.
+void decide(GeometricEvidence& found, double of_recording_log_odds, double prior_log_odds,
+            const GeometricOptions& options);
 
 }  // namespace revisit

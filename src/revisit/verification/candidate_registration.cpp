@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include <oneapi/tbb/parallel_for.h>
 
 #include <revisit/core/stopwatch.hpp>
 #include <revisit/descriptors/similarity.hpp>
 #include <revisit/verification/acceptance.hpp>
+#include <revisit/verification/look_alikes.hpp>
 
 namespace revisit {
 namespace {
@@ -44,16 +46,18 @@ Result<std::vector<Hypothesis>> CandidateRegistration::test(std::span<const Loop
   for (const LoopCandidate& candidate : candidates) {
     auto hypothesis = open(candidate);
     if (!hypothesis) return hypothesis.error();
+    if (options_.overhead_search) {
+      // The heading that the descriptors agreed on is one of several that may be right, as in a rectangular room.
+      for (Hypothesis& each : search_overhead(*hypothesis, kPi, kPosesAPlace)) hypotheses.push_back(std::move(each));
+      continue;
+    }
     hypothesis->T_guess_match_query = from_upright(*hypothesis, planar_pose(0, 0, candidate.yaw_rad));
     hypotheses.push_back(*std::move(hypothesis));
   }
   if (options_.overhead_search) {
-    const double half_sector_rad = kPi / context_.parameters.descriptor.sectors;
-    for (Hypothesis& each : hypotheses) {
-      search_overhead(half_sector_rad + kYawMargin_rad, each);
+    for (Hypothesis& each : hypotheses)
       if (each.overlap < options_.min_overlap)
         each.refusal = Refusal{Refusal::Reason::kLowOverlap, each.overlap, options_.min_overlap};
-    }
     std::stable_sort(hypotheses.begin(), hypotheses.end(),
                      [](const Hypothesis& a, const Hypothesis& b) { return a.overlap > b.overlap; });
   }
@@ -66,6 +70,7 @@ Result<std::vector<Hypothesis>> CandidateRegistration::test(std::span<const Loop
   // Each is registered on its own; the order in which they finish does not matter.
   if (std::any_of(hypotheses.begin(), hypotheses.end(), [](const Hypothesis& each) { return !each.refusal; }))
     query_geometry();
+  share_geometry(hypotheses);
   tbb::parallel_for(std::size_t{0}, hypotheses.size(), [&](std::size_t i) {
     if (!hypotheses[i].refusal) register_scans(hypotheses[i]);
   });
@@ -81,7 +86,7 @@ Result<Hypothesis> CandidateRegistration::test(const PosePrediction& prediction)
   if (!hypothesis) return hypothesis;
   hypothesis->candidate.yaw_rad =
       yaw_of(upright_pose(hypothesis->place->up) * prediction.T_match_query * upright_pose(query_.cloud.up).inverse());
-  search_overhead(kYawMargin_rad, *hypothesis);
+  hypothesis = search_overhead(*hypothesis, kYawMargin_rad, 1).front();
   hypothesis->T_guess_match_query = prediction.T_match_query;
   check_temporal_consistency(*hypothesis);
   query_geometry();
@@ -89,14 +94,43 @@ Result<Hypothesis> CandidateRegistration::test(const PosePrediction& prediction)
   return hypothesis;
 }
 
+Result<std::optional<double>> CandidateRegistration::log_odds_elsewhere(FrameId place, const Pose& T_place_query) {
+  constexpr double kRight_m = 3.0;
+  auto hypothesis = open({.match = place});
+  if (!hypothesis) return hypothesis.error();
+  Hypothesis found = search_overhead(*hypothesis, kPi, 1).front();
+  if (found.overlap < options_.min_overlap) return std::optional(LookAlikes::kNotRegistered);
+  query_geometry();
+  register_scans(found);
+  const Pose error = T_place_query.inverse() * found.geometric->T_match_query;
+  if (error.translation().norm() < kRight_m) return std::optional<double>();
+  return std::optional(loop_log_odds(found.geometric->evidence));
+}
+
+// Poses at the same place share its geometry.
+void CandidateRegistration::share_geometry(std::vector<Hypothesis>& hypotheses) const {
+  std::map<FrameId, std::shared_ptr<const ScanGeometry>> of_place;
+  for (const Hypothesis& each : hypotheses)
+    if (!each.refusal) of_place[each.candidate.match];
+  std::vector<FrameId> places;
+  for (const auto& [place, none] : of_place) places.push_back(place);
+  tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t i) {
+    const auto at = std::find_if(hypotheses.begin(), hypotheses.end(),
+                                 [&](const Hypothesis& each) { return each.candidate.match == places[i]; });
+    of_place.at(places[i]) = std::make_shared<ScanGeometry>(*at->place);
+  });
+  for (Hypothesis& each : hypotheses)
+    if (!each.refusal) each.geometry = of_place.at(each.candidate.match);
+}
+
 void CandidateRegistration::register_scans(Hypothesis& hypothesis) const {
-  hypothesis.geometry = std::make_shared<ScanGeometry>(*hypothesis.place);
+  if (!hypothesis.geometry) hypothesis.geometry = std::make_shared<ScanGeometry>(*hypothesis.place);
   hypothesis.geometric =
       check_geometric(*hypothesis.geometry, *query_geometry_,
                       {hypothesis.T_guess_match_query, hypothesis.overlap, context_.typical}, options_);
   const double support = context_.following.support_log_odds(
       query_.trajectory_point, context_.places.at(hypothesis.candidate.match), hypothesis.geometric->T_match_query);
-  decide(*hypothesis.geometric, support, options_);
+  decide(*hypothesis.geometric, context_.look_alikes_log_odds, support, options_);
   hypothesis.refusal = hypothesis.geometric->refusal;
 }
 
@@ -105,11 +139,16 @@ Pose CandidateRegistration::from_upright(const Hypothesis& hypothesis, const Pos
   return upright_pose(hypothesis.place->up).inverse() * T_match_query_upright * upright_pose(query_.cloud.up);
 }
 
-void CandidateRegistration::search_overhead(double yaw_reach_rad, Hypothesis& hypothesis) {
-  const OverheadMatch found =
-      overhead_.search(*hypothesis.place, hypothesis.candidate.yaw_rad, yaw_reach_rad, kReach_m);
-  hypothesis.T_guess_match_query = from_upright(hypothesis, planar_pose(found.x_m, found.y_m, found.yaw_rad));
-  hypothesis.overlap = found.overlap;
+std::vector<Hypothesis> CandidateRegistration::search_overhead(const Hypothesis& of_place, double yaw_reach_rad,
+                                                               std::size_t wanted) {
+  const auto found = overhead_.search(*of_place.place, of_place.candidate.yaw_rad, yaw_reach_rad, kReach_m, wanted);
+  std::vector<Hypothesis> hypotheses;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    Hypothesis& each = hypotheses.emplace_back(of_place);
+    each.T_guess_match_query = from_upright(each, planar_pose(found[i].x_m, found[i].y_m, found[i].yaw_rad));
+    each.overlap = found[i].overlap;
+  }
+  return hypotheses;
 }
 
 void CandidateRegistration::check_temporal_consistency(Hypothesis& hypothesis) const {

@@ -32,7 +32,8 @@ struct VerificationContext {
   const TrajectoryPoints& places;
   const LoopFollowing& following;
   TypicalAgreement typical;
-  FrameId newest;  ///< place that may answer
+  double look_alikes_log_odds = 0.0;  ///< LookAlikes
+  FrameId newest;                     ///< place that may answer
 };
 
 /// How one hypothesis about a query is tested: seen from overhead, then temporal consistency, then registration
@@ -47,16 +48,21 @@ class CandidateRegistration {
   /// A place that the query is predicted to stand near to: only the pose is open, and little overlap is no objection,
   /// since something may stand in the way.
   Result<Hypothesis> test(const PosePrediction& prediction);
+  /// A place that the query does not stand near to, registered as if it did: log odds by its own evidence, whatever the
+  /// recording. Nothing where the pose is right after all, since the place is in sight from afar.
+  Result<std::optional<double>> log_odds_elsewhere(FrameId place, const Pose& T_place_query);
 
   const ScanGeometry& query_geometry();
   /// The time spent on temporal consistency, which the paper counts apart.
   double temporal_ms() const { return temporal_ms_; }
 
-  static constexpr int kReach_m = 6;  ///< how far retrieval may be off; the overhead search covers it
+  static constexpr std::size_t kPosesAPlace = 2;  ///< that may be registered
+  static constexpr double kReach_m = 6.0;         ///< how far retrieval may be off; the overhead search covers it
 
  private:
   Result<Hypothesis> open(const LoopCandidate& candidate) const;
-  void search_overhead(double yaw_reach_rad, Hypothesis& hypothesis);
+  std::vector<Hypothesis> search_overhead(const Hypothesis& of_place, double yaw_reach_rad, std::size_t wanted);
+  void share_geometry(std::vector<Hypothesis>& hypotheses) const;
   void check_temporal_consistency(Hypothesis& hypothesis) const;
   void register_scans(Hypothesis& hypothesis) const;
   Pose from_upright(const Hypothesis& hypothesis, const Pose& T_match_query_upright) const;

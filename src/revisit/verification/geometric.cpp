@@ -14,11 +14,11 @@ namespace {
 
 // Docs/method.md, section 7, says how each was chosen.
 struct Registration {
-  // A start from a heading alone may be metres off, one from the overhead search hardly.
-  static constexpr double kCoarse_m = 2.0, kCoarseFromHeading_m = 4.0;
+  // Kernel widths in voxels. A start from a heading alone may be metres off, one from the overhead search hardly.
+  static constexpr double kCoarse = 2.0, kCoarseFromHeading = 4.0, kFine = 0.5;
   // Good enough to judge; other places are noticed early (docs/accuracy.md, cost).
   static constexpr double kSettled_m = 1e-3, kLeastMatched = 0.12;
-  static constexpr int kMostIterations = 40;
+  static constexpr int kMostIterations = 60;
   static constexpr double kFeatureRadius_m = 3.0;  ///< neighbourhood of an FPFH feature
 };
 
@@ -31,13 +31,15 @@ struct Refinement {
 
 GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& query, const CandidateView& view,
                                 const GeometricOptions& options) {
-  const IcpResult icp =
-      align_icp(match, query.points(), view.T_guess_match_query,
-                {.coarse_m = options.overhead_search ? Registration::kCoarse_m : Registration::kCoarseFromHeading_m,
-                 .settled_m = Registration::kSettled_m,
-                 .most_iterations = Registration::kMostIterations,
-                 .least_matched = Registration::kLeastMatched});
-  const Agreement agreement = measure_agreement(match, query, icp.T_target_source, LearntWith::kInlierDistance_m);
+  const PairScale scale(match, query);
+  const double coarse = options.overhead_search ? Registration::kCoarse : Registration::kCoarseFromHeading;
+  const IcpResult icp = align_icp(match, query.points(), view.T_guess_match_query,
+                                  {.coarse_m = coarse * scale.voxel_m,
+                                   .fine_m = Registration::kFine * scale.voxel_m,
+                                   .settled_m = Registration::kSettled_m,
+                                   .most_iterations = Registration::kMostIterations,
+                                   .least_matched = Registration::kLeastMatched});
+  const Agreement agreement = measure_agreement(match, query, icp.T_target_source, scale.inlier_distance_m());
   GeometricEvidence evidence;
   evidence.T_match_query = icp.T_target_source;
   evidence.icp_iterations = icp.iterations;
@@ -49,11 +51,12 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
   if (agreement.intensity_correlation)
     all.intensity_agreement = *agreement.intensity_correlation / view.typical.intensity_correlation;
   all.rmse_m = agreement.rmse_m;
+  all.voxel_m = scale.voxel_m;
+  all.least_fixed = agreement.least_fixed;
+  all.inliers = agreement.inliers;
   all.overlap = view.overlap;
-  all.horizon = std::min(match.seen().share_of_horizon(), query.seen().share_of_horizon());
   all.distance_m = icp.T_target_source.translation().norm();
-  evidence.has_converged = icp.converged;
-  decide(evidence, 0.0, options);
+  decide(evidence, 0.0, 0.0, options);
   return evidence;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <optional>
 
 #include <revisit/config/parameters.hpp>
@@ -12,11 +13,12 @@
 
 namespace revisit {
 
-/// What the probability was learnt with (docs/accuracy.md): with other values it would not hold, so that these are no
-/// parameters.
-struct LearntWith {
-  static constexpr double kVoxel_m = 1.0;           ///< edge of the voxels that thin a scan
-  static constexpr double kInlierDistance_m = 0.4;  ///< farthest point-to-plane distance of an inlier
+/// What is near and what is exact depends on the voxels that two scans were thinned with, the larger of both. The
+/// probability was learnt with these shares (docs/accuracy.md), so that they are no parameters.
+struct PairScale {
+  PairScale(const SurfaceCloud& a, const SurfaceCloud& b) : voxel_m(std::max(a.voxel_m(), b.voxel_m())) {}
+  double inlier_distance_m() const { return 0.4 * voxel_m; }  ///< farthest point-to-plane distance of an inlier
+  double voxel_m;
 };
 
 /// What registration says about a candidate.
@@ -24,8 +26,8 @@ struct GeometricEvidence {
   Pose T_match_query = Pose::Identity();     ///< best registration found, accepted or not
   Matrix6 information = Matrix6::Zero();     ///< of the pose, as in LoopConstraint
   LoopEvidence evidence;                     ///< measures of the registered pair
-  double log_odds = 0.0, probability = 0.0;  ///< from the evidence and the prior
-  bool has_converged = false;
+  double own_log_odds = 0.0;                 ///< of the evidence, in this recording, without the prior
+  double log_odds = 0.0, probability = 0.0;  ///< with the prior
   int icp_iterations = 0;
   std::size_t feature_matches = 0, feature_inliers = 0;  ///< FPFH; 0 where it found no transform
   bool from_features = false;      ///< ICP started from FPFH's transform, not from the descriptor's yaw

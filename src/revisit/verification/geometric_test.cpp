@@ -35,10 +35,10 @@ TEST(GeometricConsistency, InliersCountAsAShareOfTheTypicalOnes) {
   const auto in = [&](double typical) {
     return check_geometric(match, query, {planar_pose(0, 0, 0.0), 0.8, {.inlier_ratio = typical}}, {});
   };
-  const GeometricEvidence field = in(0.7), shelves = in(1.0);
+  const GeometricEvidence field = in(0.85), shelves = in(1.0);
   EXPECT_DOUBLE_EQ(field.evidence.inlier_ratio, shelves.evidence.inlier_ratio);
-  EXPECT_NEAR(field.evidence.inlier_share, shelves.evidence.inlier_ratio / 0.7, 1e-9);
-  EXPECT_GT(field.log_odds, shelves.log_odds + 3.0);
+  EXPECT_NEAR(field.evidence.inlier_share, shelves.evidence.inlier_ratio / 0.85, 1e-9);
+  EXPECT_GT(field.log_odds, shelves.log_odds + 1.0);
 }
 
 TEST(GeometricConsistency, FeaturesSaveAWrongYaw) {
@@ -78,14 +78,14 @@ TEST(GeometricConsistency, AnotherPlaceIsRefused) {
 
 TEST(GeometricConsistency, TooLongATranslationIsRefused) {
   GeometricEvidence found;
-  found.has_converged = true;
   found.evidence = {.inlier_ratio = 0.95,
                     .inlier_share = 1.0,
                     .free_space_agreement = 1.0,
                     .intensity_agreement = 1.0,
-                    .overlap = 0.9,
+                    .least_fixed = 0.2,
+                    .inliers = 1000,
                     .distance_m = 16.0};
-  decide(found, 0.0, {});
+  decide(found, 0.0, 0.0, {});
   ASSERT_TRUE(found.refusal);
   EXPECT_EQ(found.refusal->reason, Refusal::Reason::kTooFar);
   EXPECT_DOUBLE_EQ(found.refusal->value, 16.0);
@@ -118,29 +118,26 @@ TEST(GeometricConsistency, NothingToRegister) {
 
 TEST(Decide, APriorDecidesWhereTheScansLeaveItOpen) {
   GeometricEvidence found;
-  found.has_converged = true;
-  found.evidence = {.inlier_ratio = 0.68,
-                    .inlier_share = 0.8,
-                    .free_space_agreement = 0.96,
-                    .intensity_agreement = 0.9,
-                    .rmse_m = 0.12,
-                    .overlap = 0.75,
+  found.evidence = {.inlier_ratio = 0.5,
+                    .inlier_share = 0.75,
+                    .free_space_agreement = 0.92,
+                    .intensity_agreement = 0.8,
+                    .rmse_m = 0.17,
+                    .overlap = 0.7,
+                    .least_fixed = 0.2,
+                    .inliers = 1000,
                     .distance_m = 0.5};
   const double own = loop_log_odds(found.evidence);
   ASSERT_GT(own, -1.5);
   ASSERT_LT(own, 2.5) << "neither sure nor refuted";
-  decide(found, 0.0, {});
+  decide(found, 0.0, 0.0, {});
   EXPECT_FALSE(found.is_consistent());
   EXPECT_EQ(found.refusal->reason, Refusal::Reason::kImprobable);
-  decide(found, 4.5, {});
+  decide(found, 0.0, 6.5, {});
   EXPECT_TRUE(found.is_consistent());
-  EXPECT_NEAR(found.log_odds, own + 4.5, 1e-9);
-  found.has_converged = false;
-  decide(found, 4.5, {});
-  EXPECT_FALSE(found.is_consistent());
-  found.has_converged = true;
-  found.evidence.inlier_ratio = 0.3;
-  decide(found, 100.0, {});
+  EXPECT_NEAR(found.log_odds, own + 6.5, 1e-9);
+  found.evidence.inlier_ratio = 0.2;
+  decide(found, 0.0, 100.0, {});
   EXPECT_FALSE(found.is_consistent()) << "too few inliers, whatever else speaks for it";
 }
 

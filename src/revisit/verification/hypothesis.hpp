@@ -17,7 +17,7 @@ struct Hypothesis {
   double score() const;
   bool is_accepted() const { return geometric && !refusal; }
   /// The log odds of its own evidence, without a prior. It was registered.
-  double own_log_odds() const { return loop_log_odds(geometric->evidence); }
+  double own_log_odds() const { return geometric->own_log_odds; }
   /// Between query and place. It was registered.
   double distance_m() const { return geometric->T_match_query.translation().norm(); }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <optional>
 
 namespace revisit {
@@ -14,10 +15,12 @@ struct LoopEvidence {
   double free_space_agreement = 0.0;  ///< smaller of both directions
   /// Correlation of intensities, as a share of that between consecutive scans; none where intensities say nothing.
   std::optional<double> intensity_agreement;
-  double rmse_m = 0.0;      ///< point-to-plane, over the inliers
-  double overlap = 0.0;     ///< of both scans seen from overhead
-  double horizon = 1.0;     ///< share of all headings in which something was seen, smaller of both scans
-  double distance_m = 0.0;  ///< between both sensors: farther apart, less fits even at the same place
+  double rmse_m = 0.0;       ///< point-to-plane, over the inliers
+  double voxel_m = 1.0;      ///< edge of the voxels that the scans were thinned with: what lengths are measured against
+  double overlap = 0.0;      ///< of both scans seen from overhead
+  double least_fixed = 0.0;  ///< how well the surfaces fix the direction that they fix least (Agreement): a slide
+  std::size_t inliers = 0;   ///< points, smaller of both directions
+  double distance_m = 0.0;   ///< between both sensors: farther apart, less fits even at the same place
 };
 
 /// The log odds that the pose is right (within 0.5 m and 3 degrees), were right and wrong ones equally many: a logistic

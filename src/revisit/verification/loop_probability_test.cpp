@@ -6,15 +6,25 @@
 namespace revisit {
 namespace {
 
-LoopEvidence usual_revisit() { return {0.8, 0.95, 0.985, 0.95, 0.12, 0.82, 1.0, 1.0}; }
+LoopEvidence usual_revisit() {
+  return {.inlier_ratio = 0.8,
+          .inlier_share = 0.95,
+          .free_space_agreement = 0.985,
+          .intensity_agreement = 0.95,
+          .rmse_m = 0.12,
+          .least_fixed = 0.25,
+          .inliers = 1500,
+          .distance_m = 1.0};
+}
 
 TEST(LoopProbability, AUsualRevisitIsSureAndALookAlikeIsNot) {
   EXPECT_GT(probability_of(loop_log_odds(usual_revisit())), 0.98);
   LoopEvidence look_alike = usual_revisit();
-  look_alike.inlier_share = 0.7;
-  look_alike.free_space_agreement = 0.955;
-  look_alike.rmse_m = 0.18;
-  look_alike.overlap = 0.7;
+  look_alike.inlier_share = 0.5;
+  look_alike.free_space_agreement = 0.8;
+  look_alike.intensity_agreement = 0.75;
+  look_alike.rmse_m = 0.2;
+  look_alike.least_fixed = 0.02;
   EXPECT_LT(probability_of(loop_log_odds(look_alike)), 0.9);
 }
 
@@ -29,8 +39,9 @@ TEST(LoopProbability, EachPieceOfEvidenceCounts) {
   EXPECT_LT(after([](LoopEvidence& e) { e.free_space_agreement -= 0.02; }), before);
   EXPECT_LT(after([](LoopEvidence& e) { *e.intensity_agreement -= 0.1; }), before);
   EXPECT_LT(after([](LoopEvidence& e) { e.rmse_m += 0.02; }), before);
-  EXPECT_LT(after([](LoopEvidence& e) { e.overlap -= 0.1; }), before);
-  EXPECT_LT(after([](LoopEvidence& e) { e.horizon = 0.2; }), before - 3.0) << "a narrow view";
+  EXPECT_LT(after([](LoopEvidence& e) { e.voxel_m = 0.5; }), before) << "the same residual in a finer world";
+  EXPECT_LT(after([](LoopEvidence& e) { e.least_fixed = 0.01; }), before - 1.0) << "it may slide along a wall";
+  EXPECT_LT(after([](LoopEvidence& e) { e.inliers = 100; }), before - 1.0) << "few points may fit by chance";
   EXPECT_GT(after([](LoopEvidence& e) { e.distance_m += 4.0; }), before) << "from afar less must fit";
 }
 

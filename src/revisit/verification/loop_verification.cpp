@@ -40,10 +40,10 @@ Result<std::optional<Hypothesis>> LoopVerification::verify(std::span<const LoopC
   return best;
 }
 
-// Sure by its own evidence, and near: no candidate can be better.
+// Surer by its own evidence than look-alikes are, and near: no candidate can be better.
 bool LoopVerification::is_sufficient(const Hypothesis& predicted) const {
-  return predicted.is_accepted() &&
-         probability_of(predicted.own_log_odds()) >= context_.parameters.geometric.min_probability &&
+  constexpr double kBeyondDoubt = 6.0;  // log odds
+  return predicted.is_accepted() && predicted.own_log_odds() >= kBeyondDoubt &&
          predicted.distance_m() <= NearerPlace::kNear_m;
 }
 

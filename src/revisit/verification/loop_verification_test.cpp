@@ -21,7 +21,7 @@ Described described(const SyntheticWorld& world, const Pose& T_world_lidar) {
   const Scan scan = world.scan(T_world_lidar, {32, 900, -24.8, 5.0});
   std::vector<std::uint8_t> ground;
   for (const Point& p : scan.points) ground.push_back(p.z < -1.6f);
-  return {describe(scan.points, {}), thin(scan.points, ground, LearntWith::kVoxel_m)};
+  return {describe(scan.points, {}), thin_for_registration(scan.points, ground)};
 }
 
 // Places along x, a metre apart, frame by frame, and one of another world as frame 90.
@@ -80,7 +80,7 @@ TEST_F(LoopVerificationTest, TheRightCandidateWinsWhereverItStandsInTheList) {
   ASSERT_TRUE(answer && *answer);
   EXPECT_TRUE((*answer)->is_accepted());
   EXPECT_EQ((*answer)->candidate.match, FrameId{2});
-  EXPECT_EQ(verification.hypotheses().size(), 2u);
+  EXPECT_GE(verification.hypotheses().size(), 2u);
 }
 
 TEST_F(LoopVerificationTest, AnotherWorldIsRefusedForItsOverlapOrItsInliers) {

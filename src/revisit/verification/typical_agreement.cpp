@@ -27,8 +27,8 @@ bool TypicalAgreementEstimate::add(const ScanGeometry& previous, const ScanGeome
   // As well as they can agree: where odometry is off by a little, as in a turn on the spot, that is not the sensor's.
   const IcpResult icp = align_icp(previous.surface(), current.surface().points(), T_previous_current,
                                   {.coarse_m = Typical::kCoarse_m, .settled_m = Typical::kSettled_m});
-  const Agreement agreement =
-      measure_agreement(previous.surface(), current.surface(), icp.T_target_source, LearntWith::kInlierDistance_m);
+  const Agreement agreement = measure_agreement(previous.surface(), current.surface(), icp.T_target_source,
+                                                PairScale(previous.surface(), current.surface()).inlier_distance_m());
   if (agreement.inlier_ratio < Typical::kFewestInliers) return false;
   if (agreement.intensity_correlation && T_previous_current.translation().norm() > Typical::kStill_m)
     add_correlation(*agreement.intensity_correlation, 1);

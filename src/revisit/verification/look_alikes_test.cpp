@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/verification/look_alikes.hpp>
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace revisit {
+namespace {
+
+// Scores that fall off exponentially from `begin` on, in steps that cover the distribution evenly.
+LookAlikes with_scores(double begin, double scale, int count) {
+  LookAlikes alike;
+  for (int i = 0; i < count; ++i) {
+    const double share = (static_cast<double>((i * 37) % count) + 0.5) / count;
+    alike.add(begin - scale * std::log(share));
+  }
+  return alike;
+}
+
+TEST(LookAlikes, SayNothingUntilEnoughIsKnown) {
+  EXPECT_EQ(LookAlikes().log_odds(), 0.0);
+  EXPECT_EQ(with_scores(5.0, 1.0, 29).log_odds(), 0.0);
+  EXPECT_LT(with_scores(5.0, 1.0, 31).log_odds(), -0.9);
+}
+
+TEST(LookAlikes, TheMoreWrongPlacesReachTheMoreIsAsked) {
+  EXPECT_EQ(with_scores(-15.0, 1.5, 300).log_odds(), 0.0) << "places that are not alike bring nothing";
+  EXPECT_LT(with_scores(-4.0, 1.2, 300).log_odds(), -0.5);
+  EXPECT_LT(with_scores(-2.0, 1.5, 300).log_odds(), -1.5);
+  EXPECT_GE(with_scores(20.0, 3.0, 300).log_odds(), -2.0) << "never so much that nothing passes";
+}
+
+TEST(LookAlikes, WhatWasNotWorthRegisteringMakesNoTail) {
+  LookAlikes alike;
+  for (int i = 0; i < 200; ++i) alike.add(LookAlikes::kNotRegistered);
+  for (int i = 0; i < 5; ++i) alike.add(6.0);
+  EXPECT_EQ(alike.log_odds(), 0.0);
+}
+
+TEST(LookAlikes, TheLastScoresCount) {
+  LookAlikes alike = with_scores(-20.0, 0.5, 400);
+  const double before = alike.log_odds();
+  for (int i = 0; i < 400; ++i) alike.add(4.0 + 0.001 * i);
+  EXPECT_EQ(before, 0.0);
+  EXPECT_LT(alike.log_odds(), 0.0);
+}
+
+TEST(PlacesElsewhere, AreThoseThatOdometryKnowsToBe) {
+  TrajectoryPoints places;
+  TrajectoryPoint point{.segment = 3};
+  for (int frame = 0; frame < 40; ++frame) {  // a metre a frame
+    places[FrameId{frame}] = point;
+    point = point.after(planar_pose(1.0, 0.0, 0.0));
+  }
+  places[FrameId{5}].reset();
+  EXPECT_EQ(places_elsewhere(places, point).back().value, 6) << "beyond a place without a point, nothing is known";
+  places.erase(FrameId{5});
+  const auto known = places_elsewhere(places, point);
+  ASSERT_FALSE(known.empty());
+  EXPECT_EQ(known.front().value, 28) << "12 m before";
+  EXPECT_EQ(known.back().value, 0);
+  point.segment = 4;
+  EXPECT_TRUE(places_elsewhere(places, point).empty()) << "another segment";
+}
+
+}  // namespace
+}  // namespace revisit
