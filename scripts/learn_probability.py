@@ -3,8 +3,9 @@
 """Learns the coefficients of src/revisit/verification/loop_probability.cpp. Needs numpy.
 
 usage: scripts/learn_probability.py FOLDER [FOLDER ...]
-Each folder is written by `revisit detect --evidence --geometric.min_overlap 0.35 --geometric.candidates 5
---geometric.follow false` over a recording with exact poses. Every recording weighs the same, and in each the right
+Each folder is written by `revisit detect --evidence --geometric.min_overlap 0.25 --geometric.candidates 5
+--geometric.min_inlier_ratio 0 --geometric.min_probability 0 --geometric.follow false --retrieval.exclude_s 20` over a
+recording with exact poses. Every recording weighs the same, and in each the right
 poses as much as the wrong ones.
 Prints the coefficients, then, for each recording, what a model learnt on all the others says about it."""
 import csv
@@ -15,8 +16,8 @@ import numpy as np
 
 RIGHT_M, RIGHT_DEG = 0.5, 3.0  # docs/evaluation.md
 WRONG_M, WRONG_DEG = 2.0, 10.0  # in between, the place is right and the pose poor: nothing is learnt from it
-NAMES = ["inlier_share", "free_space", "intensity", "rmse_m", "overlap", "distance", "distance_root", "constant"]
-WITHOUT_INTENSITY = [0, 1, 5, 6]
+NAMES = ["inlier_share", "free_space", "intensity", "rmse", "overlap", "distance", "distance_root", "least_fixed", "few"]
+WITHOUT_INTENSITY = [0, 1, 3, 4, 5, 6, 7, 8]
 
 
 def matrix(x, y, z, qx, qy, qz, qw):
@@ -35,7 +36,7 @@ def load(folder):
     with open(folder / "evidence.csv", encoding="ascii") as stream:
         for row in csv.DictReader(stream):
             free, inliers = float(row["free_space_agreement"]), float(row["inlier_ratio"])
-            if inliers < 0.35 or free < 0.85 or not row["intensity_agreement"]:
+            if inliers < 0.2:
                 continue  # nobody would take these
             error = np.linalg.inv(np.linalg.inv(poses[int(row["match"])]) @ poses[int(row["query"])]) @ matrix(
                 *(float(row[k]) for k in ("tx", "ty", "tz", "qx", "qy", "qz", "qw")))
@@ -45,8 +46,11 @@ def load(folder):
             is_right = off_m <= RIGHT_M and angle <= RIGHT_DEG
             if not is_right and off_m < WRONG_M and angle < WRONG_DEG:
                 continue
-            X.append([float(row["inlier_share"]), -np.log(1.004 - free), float(row["intensity_agreement"]),
-                      float(row["rmse_m"]), float(row["overlap"]), distance, distance**0.5])
+            X.append([min(float(row["inlier_share"]), 1.1), -np.log(1.004 - free),
+                      np.clip(float(row["intensity_agreement"] or 0.0), -0.2, 1.1),
+                      float(row["rmse_m"]) / float(row["voxel_m"]), float(row["overlap"]), distance, distance**0.5,
+                      max(0.0, float(row["least_fixed"]))**0.5,
+                      np.log(np.clip(float(row["inliers"]), 10.0, 300.0) / 300.0)])
             right.append(is_right)
             queries.append(int(row["query"]))
     return np.array(X), np.array(right), np.array(queries)
@@ -75,7 +79,7 @@ def main():
     if not folders:
         sys.exit(__doc__)
     recordings = [load(f) for f in folders]
-    for title, columns in (("with intensity", list(range(7))), ("without", WITHOUT_INTENSITY)):
+    for title, columns in (("with intensity", list(range(len(NAMES)))), ("without", WITHOUT_INTENSITY)):
         slopes, constant = learn(recordings, columns)
         print(title, {NAMES[c]: round(float(s), 3) for c, s in zip(columns, slopes)}, "constant", round(constant, 3))
         for i, (folder, (X, right, queries)) in enumerate(zip(folders, recordings)):
@@ -85,9 +89,9 @@ def main():
             odds, own = X[:, columns] @ s + c, X[:, columns] @ slopes + constant
             found = {q: max(odds[right & (queries == q)]) for q in set(queries[right])}
             best = np.array(list(found.values()))
-            taken = [f"{(best > t).sum()}/{(odds[~right] > t).sum()}" for t in (0.0, 1.0, 2.0, 3.0)]
+            taken = [f"{(best > t).sum()}/{(odds[~right] > t).sum()}" for t in (0.0, 1.0, 3.0, 5.0)]
             print(f"  {folder.name}: {right.sum()} right, {(~right).sum()} wrong; learnt on the others, of {len(best)} "
-                  f"queries found / wrong ones taken at log odds 0, 1, 2, 3: {', '.join(taken)}; most of a wrong one "
+                  f"queries found / wrong ones taken at log odds 0, 1, 3, 5: {', '.join(taken)}; most of a wrong one "
                   f"{odds[~right].max(initial=-99):.2f}, {own[~right].max(initial=-99):.2f} learnt on all")
 
 

@@ -37,6 +37,23 @@ TEST(OverheadSearch, FindsPositionAndHeading) {
   }
 }
 
+// Four walls: turned by half, a rectangle looks the same.
+TEST(OverheadSearch, ARectangularRoomFitsBothWays) {
+  std::vector<Point> room;
+  for (float z = -1.f; z < 1.f; z += 0.5f) {
+    for (float x = -14.f; x <= 14.f; x += 0.5f)
+      for (const float y : {-8.f, 8.f}) room.push_back({x, y, z, 0.f});
+    for (float y = -8.f; y <= 8.f; y += 0.5f)
+      for (const float x : {-14.f, 14.f}) room.push_back({x, y, z, 0.f});
+  }
+  const ThinCloud cloud = thin(room, {}, 1.0);
+  OverheadSearch search(cloud);
+  const auto found = search.search(cloud, 0.0, kPi, 6.0, 2);
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_GT(found[1].overlap, 0.95);
+  EXPECT_NEAR(std::abs(wrap_angle(found[0].yaw_rad - found[1].yaw_rad)), kPi, 0.06);
+}
+
 TEST(OverheadSearch, AnotherPlaceOverlapsLess) {
   const Pose T = SyntheticWorld::at(0, 0, 0);
   const ThinCloud a = thin_scan(SyntheticWorld(31), T, 1), other = thin_scan(SyntheticWorld(32), T, 2);

@@ -249,13 +249,31 @@ TEST(Agreement, IntensitiesAreComparedWhereThereAreAny) {
   EXPECT_FALSE(measure_agreement(a, c, Pose::Identity(), 0.4).intensity_correlation) << "all alike";
 }
 
-TEST(SeenSpace, KnowsHowMuchOfTheHorizonWasSeen) {
-  std::vector<Point> ahead;
-  for (double deg = -45.0; deg < 45.0; deg += 1.0)
-    ahead.push_back({static_cast<float>(10.0 * std::cos(to_radians(deg))),
-                     static_cast<float>(10.0 * std::sin(to_radians(deg))), 0.f, 0.f});
-  EXPECT_NEAR(SeenSpace(ahead).share_of_horizon(), 0.25, 0.01);
-  EXPECT_EQ(SeenSpace().share_of_horizon(), 1.0) << "not known";
+TEST(ThinForRegistration, WhatFillsFewVoxelsIsThinnedFiner) {
+  std::vector<Point> room, street;
+  for (float x = -3.f; x < 3.f; x += 0.1f)
+    for (float z = -1.f; z < 2.f; z += 0.1f) room.push_back({x, 4.f, z, 0.f});
+  for (float x = -60.f; x < 60.f; x += 0.5f)
+    for (float y = -30.f; y < 30.f; y += 0.5f) street.push_back({x, y, -1.7f, 0.f});
+  EXPECT_EQ(thin_for_registration(room, {}).voxel_m, 0.5f);
+  EXPECT_EQ(thin_for_registration(street, {}).voxel_m, 1.f);
+  EXPECT_EQ(thin_for_registration({}, {}).points.size(), 0u);
+}
+
+TEST(Agreement, AWallFixesNothingAlongItself) {
+  std::vector<Point> wall, corner;
+  for (float x = -8.f; x < 8.f; x += 0.2f)
+    for (float z = -1.f; z < 2.f; z += 0.2f) {
+      wall.push_back({x, 5.f, z, 0.f});
+      corner.push_back({x, 5.f, z, 0.f});
+      corner.push_back({8.f, 5.f - (x + 8.f), z, 0.f});
+    }
+  const auto least_fixed = [](const std::vector<Point>& points) {
+    const SurfaceCloud cloud(thin(points, {}, 0.5));
+    return measure_agreement(cloud, cloud, Pose::Identity(), 0.2).least_fixed;
+  };
+  EXPECT_LT(least_fixed(wall), 0.02);
+  EXPECT_GT(least_fixed(corner), 0.3);
 }
 
 TEST(SeenSpace, PutsPointsWhereExactAnglesDo) {

@@ -74,14 +74,6 @@ SeenSpace::Verdict SeenSpace::look(const Eigen::Vector3f& p, float margin_m) con
   return Verdict::kSurface;
 }
 
-double SeenSpace::share_of_horizon() const {
-  if (cells_.empty()) return 1.0;
-  int seen = 0;
-  for (auto column = cells_.begin(); column != cells_.end(); column += kElevations)
-    seen += std::any_of(column, column + kElevations, [](const Interval& cell) { return cell.farthest_cm != 0; });
-  return static_cast<double>(seen) / kAzimuths;
-}
-
 std::vector<std::uint16_t> SeenSpace::ranges_cm() const {
   std::vector<std::uint16_t> ranges;
   ranges.reserve(2 * cells_.size());

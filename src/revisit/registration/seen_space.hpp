@@ -30,9 +30,6 @@ class SeenSpace {
   /// `p`, finite, in the scan's frame; `margin_m` is what the ranges may be off.
   Verdict look(const Eigen::Vector3f& p, float margin_m) const;
 
-  /// Share of the headings in which anything was seen, in [0, 1]; 1 where it is not known what was seen.
-  double share_of_horizon() const;
-
   /// Nearest and farthest range of each cell in turn, cm, to be kept; empty where nothing was seen.
   std::vector<std::uint16_t> ranges_cm() const;
   /// Nothing where they are not those of all cells.

@@ -32,6 +32,11 @@ std::unique_ptr<SimulatedRecording> make(const SimulationOptions& options, int t
   return recording ? *std::move(recording) : nullptr;
 }
 
+std::string refusal(const SimulationOptions& options) {
+  const auto recording = simulate(options);
+  return recording ? "" : recording.error().message;
+}
+
 bool same_bytes(const Scan& a, const Scan& b) {
   return a.points.size() == b.points.size() && a.rings == b.rings && a.times_s == b.times_s &&
          std::memcmp(a.points.data(), b.points.data(), a.points.size() * sizeof(Point)) == 0;
@@ -49,6 +54,34 @@ TEST(Simulation, AnotherSeedIsAnotherWorld) {
   SimulationOptions other = small("town");
   other.seed = 2;
   EXPECT_FALSE(same_bytes(*make(small("town"))->read(5), *make(other)->read(5)));
+}
+
+TEST(Simulation, DifficultyIsReproducibleAndChangesTheWorld) {
+  SimulationOptions hard = small("town", "hdl64e");
+  hard.difficulty = 1.0;
+  const Scan scan = *make(hard, 1)->read(30), tame = *make(small("town", "hdl64e"))->read(30);
+  EXPECT_TRUE(same_bytes(scan, *make(hard, 3)->read(30)));
+  EXPECT_FALSE(same_bytes(scan, tame));
+  EXPECT_LT(scan.points.size(), tame.points.size()) << "drop-outs, weather";
+  EXPECT_GT(scan.points.size(), tame.points.size() / 2);
+}
+
+TEST(Simulation, ABuildingIsWalkedThrough) {
+  SimulationOptions options = small("building", "os0-128");
+  options.difficulty = 1.0;
+  const auto walk = make(options);
+  const Scan scan = *walk->read(100);
+  EXPECT_GT(scan.points.size(), 50'000u);
+  // Walls on both sides of the corridor, a ceiling above.
+  int near = 0, above = 0;
+  for (const Point& p : scan.points) {
+    near += std::hypot(p.x, p.y) < 3.f;
+    above += p.z > 0.6f && p.z < 1.f;
+  }
+  EXPECT_GT(near, 20'000);
+  EXPECT_GT(above, 5'000);
+  options.trajectory = "poses.txt";
+  EXPECT_NE(refusal(options).find("a building has its own walk"), std::string::npos);
 }
 
 TEST(Simulation, EverySensorKeepsToItsTable) {
@@ -271,11 +304,6 @@ TEST(Simulation, StopsWhenAskedAndLeavesARecordingWithoutHoles) {
   EXPECT_GE((*read)->size(), 4u);
   EXPECT_LE((*read)->size(), 6u);
   for (std::size_t i = 0; i < (*read)->size(); ++i) EXPECT_EQ((*read)->frame(i).value, static_cast<std::int64_t>(i));
-}
-
-std::string refusal(const SimulationOptions& options) {
-  const auto recording = simulate(options);
-  return recording ? "" : recording.error().message;
 }
 
 TEST(Simulation, UnknownNamesAreToldWithTheKnownOnes) {
