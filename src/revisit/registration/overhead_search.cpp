@@ -154,6 +154,7 @@ std::vector<OverheadMatch> OverheadSearch::search(const ThinCloud& match, double
   }
   std::stable_sort(found.begin(), found.end(), [](const At& a, const At& b) { return a.shared > b.shared; });
   std::vector<OverheadMatch> matches;
+  matches.reserve(found.size() + 1);
   for (const At& each : found) matches.push_back(match_at(place, each));
   if (matches.empty()) matches.push_back({wrap_angle(yaw_rad), 0.0, 0.0, 0.0});
   return matches;

@@ -10,9 +10,9 @@ namespace {
 
 // The plan, metres: storeys that are all alike, laid side by side along y instead of one above the other. Each is a
 // corridor around a core, rooms outside of it; a passage, the staircase, leads from one to the next.
-constexpr double kBay_m = 4.0, kCorridor_m = 2.4, kRoom_m = 5.0, kWall_m = 0.2, kHeight_m = 2.8, kDoor_m = 1.0;
+constexpr double kRoomWidth_m = 4.0, kCorridor_m = 2.4, kRoom_m = 5.0, kWall_m = 0.2, kCeiling_m = 2.8, kDoor_m = 1.0;
 constexpr int kBaysAlong = 10, kBaysAcross = 5;  // of the core
-constexpr double kLong_m = kBay_m * kBaysAlong, kWide_m = kBay_m * kBaysAcross;
+constexpr double kLong_m = kRoomWidth_m * kBaysAlong, kWide_m = kRoomWidth_m * kBaysAcross;
 constexpr double kStorey_m = kWide_m + 2 * (kCorridor_m + kRoom_m) + 3.0;  // from one storey to the next
 constexpr int kStoreys = 3;
 constexpr float kAltered = 0.2f;  // of the bays, rebuilt since
@@ -24,13 +24,13 @@ class BuildingBuilder {
   void build() {
     for (int storey = 0; storey < kStoreys; ++storey) build_storey(storey);
     const double length = kLong_m + 2 * (kCorridor_m + kRoom_m) + 4.0, width = kStoreys * kStorey_m + 4.0;
-    add_box(world_.solids, {0.5 * kLong_m, 0.5 * width - kRoom_m - 4.0, 0, 0}, length, width, kHeight_m,
-            kHeight_m + 0.3, Material::kPlaster, 11);
+    add_box(world_.solids, {0.5 * kLong_m, 0.5 * width - kRoom_m - 4.0, 0, 0}, length, width, kCeiling_m,
+            kCeiling_m + 0.3, Material::kPlaster, 11);
     // The passage between storeys runs through a bay of rooms on either side.
     for (int storey = 0; storey + 1 < kStoreys; ++storey) {
       const double from = storey * kStorey_m + kWide_m + kCorridor_m, to = (storey + 1) * kStorey_m - kCorridor_m;
-      for (const double x : {0.5 * kBay_m - 0.9, 0.5 * kBay_m + 0.9})
-        add_box(world_.solids, {x, 0.5 * (from + to), 0, kPi / 2}, to - from, 0.1, 0.0, kHeight_m, Material::kPlaster,
+      for (const double x : {0.5 * kRoomWidth_m - 0.9, 0.5 * kRoomWidth_m + 0.9})
+        add_box(world_.solids, {x, 0.5 * (from + to), 0, kPi / 2}, to - from, 0.1, 0.0, kCeiling_m, Material::kPlaster,
                 12);
     }
   }
@@ -53,9 +53,10 @@ class BuildingBuilder {
 
   void build_side(const Stand& side, int bays, int storey, int number) {
     for (int bay = 0; bay < bays; ++bay) {
-      const double middle = (bay + 0.5) * kBay_m;
+      const double middle = (bay + 0.5) * kRoomWidth_m;
       // What the architect drew is the same in all storeys, what people brought is not.
-      const std::uint64_t everywhere = mix(world_.seed, static_cast<std::uint64_t>(100 * number + bay)),
+      const std::uint64_t everywhere = mix(world_.seed, std::uint64_t{100} * static_cast<std::uint64_t>(number) +
+                                                            static_cast<std::uint64_t>(bay)),
                           brought = mix(everywhere, static_cast<std::uint64_t>(storey) + 1);
       const std::uint64_t drawn = uniform(mix(brought, 7)) < kAltered ? brought : everywhere;
       build_core(side, middle, drawn, brought);
@@ -64,9 +65,9 @@ class BuildingBuilder {
       if (!is_passage) build_room(side, middle, drawn, brought);
     }
     // The corner: the outer walls go on to where they meet.
-    const double length = kBay_m * bays, outer = kCorridor_m;
+    const double length = kRoomWidth_m * bays, outer = kCorridor_m;
     for (const double end : {-0.5 * kCorridor_m, length + 0.5 * kCorridor_m})
-      add_box(world_.solids, at(side, end, outer + 0.5 * kWall_m), kCorridor_m, kWall_m, 0.0, kHeight_m,
+      add_box(world_.solids, at(side, end, outer + 0.5 * kWall_m), kCorridor_m, kWall_m, 0.0, kCeiling_m,
               Material::kPlaster, 13);
   }
 
@@ -74,11 +75,12 @@ class BuildingBuilder {
     Random random(drawn);
     if (random.chance(0.2)) {  // a colonnade before a glass wall
       for (const double x : {-1.3, 1.3})
-        add_post(world_.solids, at(side, middle + x, -0.3), kHeight_m, 0.2, Material::kConcrete, 14);
-      add_box(world_.solids, at(side, middle, -1.6), kBay_m, 0.1, 0.0, kHeight_m, Material::kGlass, drawn);
+        add_post(world_.solids, at(side, middle + x, -0.3), kCeiling_m, 0.2, Material::kConcrete, 14);
+      add_box(world_.solids, at(side, middle, -1.6), kRoomWidth_m, 0.1, 0.0, kCeiling_m, Material::kGlass, drawn);
       return;
     }
-    add_box(world_.solids, at(side, middle, -0.5 * kWall_m), kBay_m, kWall_m, 0.0, kHeight_m, Material::kPlaster, 15);
+    add_box(world_.solids, at(side, middle, -0.5 * kWall_m), kRoomWidth_m, kWall_m, 0.0, kCeiling_m, Material::kPlaster,
+            15);
     add_box(world_.solids, at(side, middle, 0.02), kDoor_m, 0.04, 0.0, 2.1, Material::kDoor, drawn);
     Random things(brought);
     fit_out(side, middle, 0.0, 1.0, things);
@@ -102,22 +104,23 @@ class BuildingBuilder {
 
   void build_room(const Stand& side, double middle, std::uint64_t drawn, std::uint64_t brought) {
     Random random(drawn), things(brought);
-    const double wall = kCorridor_m + 0.5 * kWall_m, half = 0.5 * (kBay_m - kDoor_m), door = random.uniform(-0.8, 0.8);
+    const double wall = kCorridor_m + 0.5 * kWall_m, half = 0.5 * (kRoomWidth_m - kDoor_m),
+                 door = random.uniform(-0.8, 0.8);
     for (const double sign : {-1.0, 1.0}) {
       const double length = half - sign * door;
       add_box(world_.solids, at(side, middle + door + sign * 0.5 * (kDoor_m + length), wall), length, kWall_m, 0.0,
-              kHeight_m, Material::kPlaster, 16);
+              kCeiling_m, Material::kPlaster, 16);
     }
-    add_box(world_.solids, at(side, middle + door, wall), kDoor_m, kWall_m, 2.1, kHeight_m, Material::kPlaster, 16);
+    add_box(world_.solids, at(side, middle + door, wall), kDoor_m, kWall_m, 2.1, kCeiling_m, Material::kPlaster, 16);
     fit_out(side, middle, kCorridor_m, -1.0, things);
     world_.movers.slots.push_back({at(side, middle + door, wall), things.next(), 0.55, 0.33, 0.0, 0.0,
                                    ParkingSlot::For::kDoor});  // closed, or open
-    add_box(world_.solids, at(side, middle + 0.5 * kBay_m, wall + 0.5 * kRoom_m, kPi / 2), kRoom_m, 0.12, 0.0,
-            kHeight_m, Material::kPlaster, 17);
+    add_box(world_.solids, at(side, middle + 0.5 * kRoomWidth_m, wall + 0.5 * kRoom_m, kPi / 2), kRoom_m, 0.12, 0.0,
+            kCeiling_m, Material::kPlaster, 17);
     const double back = kCorridor_m + kRoom_m;
-    add_box(world_.solids, at(side, middle, back), kBay_m, kWall_m, 0.0, 0.9, Material::kPlaster, 18);
-    add_box(world_.solids, at(side, middle, back), kBay_m, 0.04, 0.9, 2.3, Material::kGlass, 19);
-    add_box(world_.solids, at(side, middle, back), kBay_m, kWall_m, 2.3, kHeight_m, Material::kPlaster, 18);
+    add_box(world_.solids, at(side, middle, back), kRoomWidth_m, kWall_m, 0.0, 0.9, Material::kPlaster, 18);
+    add_box(world_.solids, at(side, middle, back), kRoomWidth_m, 0.04, 0.9, 2.3, Material::kGlass, 19);
+    add_box(world_.solids, at(side, middle, back), kRoomWidth_m, kWall_m, 2.3, kCeiling_m, Material::kPlaster, 18);
     for (int i = things.whole(1, 4); i > 0; --i) {
       const Stand place = at(side, middle + things.uniform(-1.4, 1.4), kCorridor_m + things.uniform(1.2, kRoom_m - 0.8),
                              things.chance(0.5) ? kPi / 2 : 0.0);
@@ -149,7 +152,7 @@ std::vector<Knot> walk(double length_m, Random& random) {
     for (std::size_t i = 1; i < corners.size(); ++i) sum += (corners[i] - corners[i - 1]).norm();
     return sum;
   };
-  std::vector<Eigen::Vector2d> corners = {{0.5 * kBay_m, -out}};
+  std::vector<Eigen::Vector2d> corners = {{0.5 * kRoomWidth_m, -out}};
   int storey = 0, step = 1;
   for (int round = 0; length_of(corners) < length_m; ++round) {
     const bool is_left = random.chance(0.6);
@@ -158,7 +161,7 @@ std::vector<Knot> walk(double length_m, Random& random) {
     if (round % 2 == 0) continue;
     // Through the passage, which leaves from the far corridor upwards and from the near one downwards.
     if (storey + step < 0 || storey + step >= kStoreys) step = -step;
-    const double passage = 0.5 * kBay_m, near = storey * kStorey_m - out, far = near + kWide_m + 2 * out;
+    const double passage = 0.5 * kRoomWidth_m, near = storey * kStorey_m - out, far = near + kWide_m + 2 * out;
     if (!is_left) corners.push_back(corner(storey, 0));
     if (step > 0) corners.push_back(corner(storey, 3));
     corners.emplace_back(passage, step > 0 ? far : near);

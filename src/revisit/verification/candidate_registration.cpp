@@ -113,6 +113,7 @@ void CandidateRegistration::share_geometry(std::vector<Hypothesis>& hypotheses) 
   for (const Hypothesis& each : hypotheses)
     if (!each.refusal) of_place[each.candidate.match];
   std::vector<FrameId> places;
+  places.reserve(of_place.size());
   for (const auto& [place, none] : of_place) places.push_back(place);
   tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t i) {
     const auto at = std::find_if(hypotheses.begin(), hypotheses.end(),
