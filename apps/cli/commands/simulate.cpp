@@ -46,7 +46,7 @@ int run_simulation(const SimulateOptions& options) {
 Run add_simulate(CLI::App& program) {
   auto options = std::make_shared<SimulateOptions>();
   CLI::App* command =
-      program.add_subcommand("simulate", "Drive a LiDAR through a town or a warehouse, with exact truth.");
+      program.add_subcommand("simulate", "Drive a LiDAR through a town, a warehouse or a building, with exact truth.");
   command->footer(
       "Writes a KITTI odometry folder (formats: docs/formats.md):\n"
       "  velodyne/           the scans; beside it velodyne_times/ and velodyne_rings/, one value a point\n"

@@ -38,8 +38,8 @@ class OverheadSearch {
   explicit OverheadSearch(const ThinCloud& query) : query_(query) {}
 
   /// Of all headings within `yaw_reach_rad` of `yaw_rad`, at positions up to `reach_m` (less than 63 cells) along x and
-  /// y: the one at which the scans share most, and the next ones that stand or look elsewhere, at most `wanted`. At
-  /// least one.
+  /// y: the pose at which the scans share most cells, and the next best ones that lie more than 3 cells or 12 degrees
+  /// from it, at most `wanted`; at least one. A `yaw_reach_rad` of pi is every heading.
   std::vector<OverheadMatch> search(const ThinCloud& match, double yaw_rad, double yaw_reach_rad, double reach_m,
                                     std::size_t wanted = 1);
 

@@ -52,7 +52,9 @@ class SurfaceCloud final : public Surface {
   /// Unit normal, sign arbitrary; zero where the neighbours are fewer than five or on one line.
   const Eigen::Vector3f& normal(std::size_t i) const { return normals_[i]; }
   bool is_ground(std::size_t i) const { return cloud_.is_ground[i] != 0; }
+  /// Unit vector from the ground, LiDAR frame (ThinCloud::up).
   const Eigen::Vector3f& up() const { return cloud_.up; }
+  /// Edge of the voxels that the cloud was thinned with.
   double voxel_m() const { return static_cast<double>(cloud_.voxel_m); }
   float intensity(std::size_t i) const { return cloud_.intensity[i]; }
   const SeenSpace& seen() const { return cloud_.seen; }

@@ -42,8 +42,8 @@ class CandidateRegistration {
  public:
   CandidateRegistration(const VerificationContext& context, const VerificationQuery& query);
 
-  /// The candidates that fit best from overhead, at most `options.candidates`, registered where nothing refuses them
-  /// before. An error where the cloud of a place cannot be read.
+  /// The poses that fit best from overhead, two a candidate and at most `options.candidates`, registered where nothing
+  /// refuses them before. An error where the cloud of a place cannot be read.
   Result<std::vector<Hypothesis>> test(std::span<const LoopCandidate> candidates);
   /// A place that the query is predicted to stand near to: only the pose is open, and little overlap is no objection,
   /// since something may stand in the way.
