@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How often two scans are registered without a guess (docs/accuracy.md): pairs of one recording, 2 to 10 m apart, the
 // second turned to any heading; from different visits where the recording has them.
-// Or pairs that show different places, of which none may be given: 50 m apart and more.
+// Or pairs that show different places, FARTHEST_M apart and more, of which none may be given.
 // usage: register_pairs RECORDING [PAIRS [FARTHEST_M [SEED [any|visits|elsewhere]]]]
 #include <chrono>
 #include <cstdio>
@@ -75,7 +75,7 @@ int main(int argc, char** argv) {
   const auto seed = static_cast<unsigned>(argc > 4 ? std::atoi(argv[4]) : 1);
   const std::string kind = argc > 5 ? argv[5] : "any";
   const std::vector<Pair> pairs = kind == "elsewhere"
-                                      ? draw_pairs(*recording, wanted, 50.0, 1e6, seed, false)
+                                      ? draw_pairs(*recording, wanted, most_m, 1e6, seed, false)
                                       : draw_pairs(*recording, wanted, 2.0, most_m, seed, kind == "visits");
   std::mt19937 random(seed + 1);
   std::uniform_real_distribution<double> heading(-kPi, kPi);

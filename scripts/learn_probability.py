@@ -16,8 +16,8 @@ import numpy as np
 
 RIGHT_M, RIGHT_DEG = 0.5, 3.0  # docs/evaluation.md
 WRONG_M, WRONG_DEG = 2.0, 10.0  # in between, the place is right and the pose poor: nothing is learnt from it
-NAMES = ["inlier_share", "free_space", "intensity", "rmse", "overlap", "distance", "distance_root", "least_fixed", "few"]
-WITHOUT_INTENSITY = [0, 1, 3, 4, 5, 6, 7, 8]
+NAMES = ["inlier_share", "free_space", "intensity", "rmse", "overlap", "least_fixed", "few"]
+WITHOUT_INTENSITY = [0, 1, 3, 4, 5, 6]
 
 
 def matrix(x, y, z, qx, qy, qz, qw):
@@ -46,9 +46,9 @@ def load(folder):
             is_right = off_m <= RIGHT_M and angle <= RIGHT_DEG
             if not is_right and off_m < WRONG_M and angle < WRONG_DEG:
                 continue
-            X.append([min(float(row["inlier_share"]), 1.1), -np.log(1.004 - free),
+            X.append([min(float(row["inlier_share"]) / (1.0 - 0.3 * distance), 1.1), -np.log(1.004 - free),
                       np.clip(float(row["intensity_agreement"] or 0.0), -0.2, 1.1),
-                      float(row["rmse_m"]) / float(row["voxel_m"]), float(row["overlap"]), distance, distance**0.5,
+                      float(row["rmse_m"]) / float(row.get("voxel_m") or 1.0), float(row["overlap"]),
                       max(0.0, float(row["least_fixed"]))**0.5,
                       np.log(np.clip(float(row["inliers"]), 10.0, 300.0) / 300.0)])
             right.append(is_right)

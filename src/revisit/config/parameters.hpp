@@ -54,7 +54,7 @@ struct GeometricOptions {
   double min_overlap = 0.3;        ///< of both images from overhead; candidates below are not registered
   std::string features = "never";  ///< FPFH: never; fallback, where the yaw gave no loop; first, as the paper
   double min_inlier_ratio = 0.25;  ///< share of the points above ground, both ways, that must be inliers
-  double min_probability = 0.99;   ///< that the pose is right (docs/accuracy.md); 0 never refuses
+  double min_probability = 0.95;   ///< that the pose is right (docs/accuracy.md); 0 never refuses
 };
 
 /// Trajectory and map (docs/slam.md).

@@ -11,6 +11,7 @@ struct Refusal {
     kNoSearchablePast,        ///< every place is too recent
     kNoCandidate,             ///< no place passed the thresholds of retrieval
     kNoPose,                  ///< the method retrieves only: there is nothing to verify
+    kElsewhere,               ///< by odometry, metres
     kLowOverlap,              ///< seen from overhead
     kTemporallyInconsistent,  ///< the frames before do not match (eq. 11)
     kFewInliers,

@@ -19,6 +19,8 @@ inline std::string to_text(const Refusal& refusal) {
       return "no similar place";
     case Reason::kNoPose:
       return "retrieval only: no pose to verify";
+    case Reason::kElsewhere:
+      return format("%.0f m away by odometry: more than %.0f m", value, limit);
     case Reason::kLowOverlap:
       return format("overlap seen from overhead %.2f below %.2f", value, limit);
     case Reason::kTemporallyInconsistent:

@@ -14,15 +14,33 @@ namespace revisit {
 struct TrajectoryPoint {
   int segment = 0;
   Pose T_segment_lidar = Pose::Identity();
-  double travelled_m = 0.0;  ///< from the beginning of the segment
+  double travelled_m = 0.0;  ///< from the origin
   double turned_rad = 0.0;   ///< likewise: the sum of all rotations, whichever way
+  /// Segments of one origin have the same coordinates, though tracking failed for a moment in between: good enough to
+  /// tell what is far away.
+  int origin = 0;
+  double off_m = 0.0;  ///< what the gaps since the origin may be off, all together
 
   /// The next point of the same segment.
   TrajectoryPoint after(const Pose& T_here_next) const {
-    return {segment, T_segment_lidar * T_here_next, travelled_m + T_here_next.translation().norm(),
-            turned_rad + rotation_angle(T_here_next)};
+    return {segment,
+            T_segment_lidar * T_here_next,
+            travelled_m + T_here_next.translation().norm(),
+            turned_rad + rotation_angle(T_here_next),
+            origin,
+            off_m};
   }
-  /// The same, where the pose of the next one is known.
+  /// The first point of the next segment, where the motion in between was only predicted: off by so many metres at
+  /// most.
+  TrajectoryPoint after_gap(const Pose& T_predicted_here_next, double off_m) const {
+    TrajectoryPoint next = after(T_predicted_here_next);
+    ++next.segment;
+    next.off_m += off_m;
+    return next;
+  }
+  /// The first point of a segment of which is not known how it lies to those before.
+  TrajectoryPoint lost() const { return {.segment = segment + 1, .origin = origin + 1}; }
+  /// The same as after(), where the pose of the next one is known.
   TrajectoryPoint to(const Pose& T_segment_next) const {
     TrajectoryPoint next = after(T_segment_lidar.inverse() * T_segment_next);
     next.T_segment_lidar = T_segment_next;

@@ -7,6 +7,11 @@
 #include <revisit/preprocess/range_filter.hpp>
 
 namespace revisit {
+namespace {
+
+constexpr double kGap_m = 2.0;  // that a sensor may have moved otherwise than predicted, from scan to scan
+
+}  // namespace
 
 LoopDetector::LoopDetector(const Parameters& parameters, const std::optional<IntensityScale>& scale,
                            IntensityCalibration calibration, LogSink log)
@@ -51,7 +56,7 @@ Result<LoopDetector::Prepared> LoopDetector::follow_and_prepare(Scan scan) {
   auto prepared = preparation_.prepare(std::move(scan), step.motion);
   if (!prepared) {
     previous_.reset();
-    point_ = {.segment = point_.segment + 1};
+    point_ = point_.lost();
     return prepared.error();
   }
   prepared->geometry = std::make_shared<ScanGeometry>(prepared->cloud);
@@ -66,7 +71,7 @@ TrajectoryPoint LoopDetector::next_point(const OdometryStep& step, PreparedScan&
       step.is_connected && previous_ && typical_.add(*previous_, *prepared.geometry, step.T_previous_lidar);
   if (is_connected) return point_.after(step.T_previous_lidar);
   typical_.interrupt();
-  return {.segment = point_.segment + 1};
+  return step.lost ? point_.lost() : point_.after_gap(step.T_previous_lidar, kGap_m);
 }
 
 Status LoopDetector::remember(PreparedScan prepared, const std::optional<Pose>& T_world_lidar) {

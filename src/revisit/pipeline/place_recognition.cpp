@@ -6,6 +6,7 @@
 
 #include <revisit/core/stopwatch.hpp>
 #include <revisit/descriptors/similarity.hpp>
+#include <revisit/verification/elsewhere.hpp>
 #include <revisit/verification/loop_verification.hpp>
 
 namespace revisit {

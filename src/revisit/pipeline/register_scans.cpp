@@ -17,8 +17,14 @@ namespace {
 constexpr double kReach_m = 12.0;   // scans farther apart share too little
 constexpr std::size_t kStarts = 6;  // poses from overhead that are registered
 // Who asks how two scans lie to each other believes that they show one place; of candidates for a loop nearly all do
-// not.
-constexpr double kPrior_log_odds = 4.0;
+// not. Rooms, which are thinned finely, fit one another, and themselves turned by 90 degrees.
+constexpr double kPrior_log_odds = 4.6, kPriorOfRooms_log_odds = 2.0;
+constexpr double kOther_m = 1.0, kOther_rad = 0.2;  // poses farther apart exclude each other
+
+bool is_other(const Pose& a, const Pose& b) {
+  const Pose apart = a.inverse() * b;
+  return apart.translation().norm() > kOther_m || rotation_angle(apart) > kOther_rad;
+}
 
 // Every heading and position seen from overhead; the ones that share most are registered, the surest is the answer.
 GeometricEvidence register_without_guess(const ThinCloud& target_cloud, const ThinCloud& source_cloud,
@@ -26,6 +32,8 @@ GeometricEvidence register_without_guess(const ThinCloud& target_cloud, const Th
                                          const GeometricOptions& options) {
   OverheadSearch search(source_cloud);
   const auto starts = search.search(target_cloud, 0.0, kPi, kReach_m, kStarts);
+  const double prior =
+      PairScale(target.surface(), source.surface()).voxel_m < 1.0 ? kPriorOfRooms_log_odds : kPrior_log_odds;
   std::vector<GeometricEvidence> found(starts.size());
   tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
     CandidateView view;
@@ -34,10 +42,16 @@ GeometricEvidence register_without_guess(const ThinCloud& target_cloud, const Th
                                upright_pose(source_cloud.up);
     view.overlap = starts[i].overlap;
     found[i] = check_geometric(target, source, view, options);
-    decide(found[i], 0.0, kPrior_log_odds, options);
   });
-  return *std::max_element(found.begin(), found.end(),
-                           [](const auto& a, const auto& b) { return a.log_odds < b.log_odds; });
+  GeometricEvidence best = *std::max_element(
+      found.begin(), found.end(), [](const auto& a, const auto& b) { return a.own_log_odds < b.own_log_odds; });
+  // One pose is right at most: what another explains as well speaks against this one.
+  double others = 0.0;
+  for (const GeometricEvidence& each : found)
+    if (is_other(each.T_match_query, best.T_match_query))
+      others = std::max(others, std::exp(each.own_log_odds + prior));
+  decide(best, 0.0, prior - std::log1p(others), options);
+  return best;
 }
 
 }  // namespace

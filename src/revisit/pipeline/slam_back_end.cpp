@@ -40,9 +40,10 @@ Result<SlamBackEnd::Added> SlamBackEnd::add_keyframe(PreparedScan scan, const Od
   const FrameId frame = scan.scan.frame;
   const bool is_first = graph_.keyframes().empty();
   const bool is_new_segment = is_first || odometry.segment != graph_.last_point().segment;
-  const TrajectoryPoint point =
-      is_new_segment ? TrajectoryPoint{.segment = odometry.segment, .T_segment_lidar = odometry.T_odom_lidar}
-                     : graph_.last_point().to(odometry.T_odom_lidar);
+  const TrajectoryPoint point = is_new_segment ? TrajectoryPoint{.segment = odometry.segment,
+                                                                 .T_segment_lidar = odometry.T_odom_lidar,
+                                                                 .origin = odometry.segment}
+                                               : graph_.last_point().to(odometry.T_odom_lidar);
   const bool starts = starts_segment(point);
   scan.trajectory_point = point;
   // The cloud is thinned for the map meanwhile, for nothing where the place turns out to be known.

@@ -35,7 +35,7 @@ Result<std::vector<StoredSession::Keyframe>> join(const MapStore& store, const s
     if (!keyframes.empty()) {
       const TrajectoryPoint& last = keyframes.back().point;
       if (row.starts_segment)
-        keyframe.point.segment = last.segment + 1;
+        keyframe.point.segment = keyframe.point.origin = last.segment + 1;
       else
         keyframe.point = last.to(row.T_odom_lidar);
       keyframe.edge = {edge->second->T_from_to, edge->second->information};

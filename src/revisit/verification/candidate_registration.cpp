@@ -10,6 +10,7 @@
 #include <revisit/core/stopwatch.hpp>
 #include <revisit/descriptors/similarity.hpp>
 #include <revisit/verification/acceptance.hpp>
+#include <revisit/verification/elsewhere.hpp>
 #include <revisit/verification/look_alikes.hpp>
 
 namespace revisit {
@@ -43,7 +44,17 @@ Result<Hypothesis> CandidateRegistration::open(const LoopCandidate& candidate) c
 
 Result<std::vector<Hypothesis>> CandidateRegistration::test(std::span<const LoopCandidate> candidates) {
   std::vector<Hypothesis> hypotheses;
+  std::optional<Hypothesis> elsewhere;  // the best of them
   for (const LoopCandidate& candidate : candidates) {
+    if (const auto place = context_.places.find(candidate.match); options_.follow && place != context_.places.end())
+      if (const auto refusal = refuse_elsewhere(place->second, query_.trajectory_point)) {
+        if (!elsewhere) {
+          elsewhere.emplace();
+          elsewhere->candidate = candidate;
+          elsewhere->refusal = refusal;
+        }
+        continue;
+      }
     auto hypothesis = open(candidate);
     if (!hypothesis) return hypothesis.error();
     if (options_.overhead_search) {
@@ -54,6 +65,7 @@ Result<std::vector<Hypothesis>> CandidateRegistration::test(std::span<const Loop
     hypothesis->T_guess_match_query = from_upright(*hypothesis, planar_pose(0, 0, candidate.yaw_rad));
     hypotheses.push_back(*std::move(hypothesis));
   }
+  if (hypotheses.empty() && elsewhere) return std::vector{*std::move(elsewhere)};
   if (options_.overhead_search) {
     for (Hypothesis& each : hypotheses)
       if (each.overlap < options_.min_overlap)
@@ -90,7 +102,7 @@ Result<Hypothesis> CandidateRegistration::test(const PosePrediction& prediction)
   hypothesis->T_guess_match_query = prediction.T_match_query;
   check_temporal_consistency(*hypothesis);
   query_geometry();
-  if (!hypothesis->refusal) register_scans(*hypothesis);
+  if (!hypothesis->refusal) register_scans(*hypothesis, &prediction);
   return hypothesis;
 }
 
@@ -124,13 +136,16 @@ void CandidateRegistration::share_geometry(std::vector<Hypothesis>& hypotheses) 
     if (!each.refusal) each.geometry = of_place.at(each.candidate.match);
 }
 
-void CandidateRegistration::register_scans(Hypothesis& hypothesis) const {
+void CandidateRegistration::register_scans(Hypothesis& hypothesis, const PosePrediction* prediction) const {
   if (!hypothesis.geometry) hypothesis.geometry = std::make_shared<ScanGeometry>(*hypothesis.place);
   hypothesis.geometric =
       check_geometric(*hypothesis.geometry, *query_geometry_,
                       {hypothesis.T_guess_match_query, hypothesis.overlap, context_.typical}, options_);
-  const double support = context_.following.support_log_odds(
+  double support = context_.following.support_log_odds(
       query_.trajectory_point, context_.places.at(hypothesis.candidate.match), hypothesis.geometric->T_match_query);
+  if (const Pose& found = hypothesis.geometric->T_match_query;
+      prediction != nullptr && agree(prediction->T_match_query, found, found.translation().norm()))
+    support = std::max(support, LoopFollowing::carried(prediction->log_odds, 0.0));
   decide(*hypothesis.geometric, context_.look_alikes_log_odds, support, options_);
   hypothesis.refusal = hypothesis.geometric->refusal;
 }

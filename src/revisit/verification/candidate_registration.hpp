@@ -64,7 +64,7 @@ class CandidateRegistration {
   std::vector<Hypothesis> search_overhead(const Hypothesis& of_place, double yaw_reach_rad, std::size_t wanted);
   void share_geometry(std::vector<Hypothesis>& hypotheses) const;
   void check_temporal_consistency(Hypothesis& hypothesis) const;
-  void register_scans(Hypothesis& hypothesis) const;
+  void register_scans(Hypothesis& hypothesis, const PosePrediction* prediction = nullptr) const;
   Pose from_upright(const Hypothesis& hypothesis, const Pose& T_match_query_upright) const;
 
   const VerificationContext& context_;

@@ -13,13 +13,8 @@ struct Tail {
   static constexpr std::size_t kFewestRegistered = 10;     ///< for a tail
   static constexpr double kRare = 1e-3;                    ///< share of the places elsewhere that would reach the end
   static constexpr double kUsualEnd = 3.0;                 ///< of the recordings that the model was learnt on
-  static constexpr double kMostCaution = 2.0;              ///< log odds
+  static constexpr double kMostCaution = 4.0;              ///< log odds
   static constexpr double kDoubt = 30.0;                   ///< scores by which what is usual counts
-};
-
-struct Elsewhere {
-  static constexpr double kNearest_m = 12.0, kMostTravelled_m = 150.0;
-  static constexpr std::size_t kMost = 60;  ///< places that are given
 };
 
 // Where a tail of exceedances that fall off exponentially leaves but a rare share.
@@ -54,17 +49,6 @@ double LookAlikes::log_odds() const {
     known_ = n / (n + Tail::kDoubt) * std::clamp(Tail::kUsualEnd - end_of_tail(scores_), -Tail::kMostCaution, 0.0);
   }
   return *known_;
-}
-
-std::vector<FrameId> places_elsewhere(const TrajectoryPoints& places, const TrajectoryPoint& point) {
-  std::vector<FrameId> frames;
-  for (auto it = places.rbegin(); it != places.rend() && frames.size() < Elsewhere::kMost; ++it) {
-    if (!it->second || it->second->segment != point.segment ||
-        point.travelled_m - it->second->travelled_m > Elsewhere::kMostTravelled_m)
-      break;
-    if (T_between(*it->second, point).translation().norm() >= Elsewhere::kNearest_m) frames.push_back(it->first);
-  }
-  return frames;
 }
 
 }  // namespace revisit

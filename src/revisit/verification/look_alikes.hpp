@@ -5,10 +5,6 @@
 #include <optional>
 #include <vector>
 
-#include <revisit/core/ids.hpp>
-#include <revisit/core/trajectory_point.hpp>
-#include <revisit/verification/loop_following.hpp>
-
 namespace revisit {
 
 /// How much alike different places of this recording are. Of places that odometry knows to be elsewhere, the one that
@@ -30,8 +26,5 @@ class LookAlikes {
   std::size_t next_ = 0;
   mutable std::optional<double> known_;
 };
-
-/// Frames of places that odometry knows to be elsewhere than the point, the newest first.
-std::vector<FrameId> places_elsewhere(const TrajectoryPoints& places, const TrajectoryPoint& point);
 
 }  // namespace revisit

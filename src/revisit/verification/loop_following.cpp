@@ -48,9 +48,17 @@ std::optional<PosePrediction> nearest_place(const TrajectoryPoints& places, Fram
   return nearest;
 }
 
-double LoopFollowing::Anchor::log_odds_after(double motion_m) const {
+bool agree(const Pose& T_predicted, const Pose& T_found, double motion_m) {
+  const Pose error = T_predicted.inverse() * T_found;
+  return error.translation().norm() <= Following::kTolerance_m + Following::kTolerance_mAMetre * motion_m &&
+         rotation_angle(error) <= Following::kTolerance_rad + Following::kTolerance_radAMetre * motion_m;
+}
+
+double LoopFollowing::carried(double log_odds, double motion_m) {
   return std::max(0.0, std::min(log_odds, Following::kMostSupport) - Following::kLogOddsLostAMetre * motion_m);
 }
+
+double LoopFollowing::Anchor::log_odds_after(double motion_m) const { return carried(log_odds, motion_m); }
 
 void LoopFollowing::add(const TrajectoryPoint& query, FrameId match, const TrajectoryPoint& place,
                         const Pose& T_match_query, double log_odds) {
@@ -84,11 +92,7 @@ double LoopFollowing::support_log_odds(const std::optional<TrajectoryPoint>& que
     const auto query_m = reliable_motion_m(anchor.query, *query), place_m = reliable_motion_m(anchor.place, *place);
     if (!query_m || !place_m) continue;
     const Pose T_predicted = place->T_segment_lidar.inverse() * anchor.T_place_query_segment * query->T_segment_lidar;
-    const Pose error = T_predicted.inverse() * T_match_query;
-    const double motion_m = *query_m + *place_m;
-    if (error.translation().norm() <= Following::kTolerance_m + Following::kTolerance_mAMetre * motion_m &&
-        rotation_angle(error) <= Following::kTolerance_rad + Following::kTolerance_radAMetre * motion_m)
-      most = std::max(most, anchor.log_odds_after(*query_m));
+    if (agree(T_predicted, T_match_query, *query_m + *place_m)) most = std::max(most, anchor.log_odds_after(*query_m));
   }
   return most;
 }

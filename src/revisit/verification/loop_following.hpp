@@ -18,7 +18,11 @@ using TrajectoryPoints = std::map<FrameId, std::optional<TrajectoryPoint>>;
 struct PosePrediction {
   FrameId match;
   Pose T_match_query = Pose::Identity();
+  double log_odds = 0.0;  ///< of the prediction, where it comes from another place that was registered
 };
+
+/// Whether the pose found is the one predicted, over so much motion of odometry.
+bool agree(const Pose& T_predicted, const Pose& T_found, double motion_m);
 
 /// Metres of motion between two points over which odometry can be relied on: travelled metres, and turns as the metres
 /// that bring as much error. Nothing where it is more than that, or where the segments differ.
@@ -36,6 +40,8 @@ class LoopFollowing {
   /// Remembers a loop with its log odds: those of its own evidence and of the loops before it that support it.
   void add(const TrajectoryPoint& query, FrameId match, const TrajectoryPoint& place, const Pose& T_match_query,
            double log_odds);
+  /// What a loop of these log odds adds to one so much motion away.
+  static double carried(double log_odds, double motion_m);
   /// Where the surest loop of the last metres says that the query stands, relative to the nearest place that is no
   /// newer than `newest`.
   std::optional<PosePrediction> predict(const std::optional<TrajectoryPoint>& query, const TrajectoryPoints& places,

@@ -12,6 +12,7 @@ LoopEvidence usual_revisit() {
           .free_space_agreement = 0.985,
           .intensity_agreement = 0.95,
           .rmse_m = 0.12,
+          .overlap = 0.8,
           .least_fixed = 0.25,
           .inliers = 1500,
           .distance_m = 1.0};

@@ -6,8 +6,8 @@
 namespace revisit {
 namespace {
 
-// The nearer place: from far away little fits even at the right place, and much is forgiven; what is much nearer must
-// fit by itself, so that it decides (VLP-16 along KITTI 02, seed 47: docs/history.md).
+// The nearer place: from far away little fits even at the right place; what is much nearer fits better where the pose
+// is right, and decides, with what the far one says for it (docs/history.md).
 struct NearerPlace {
   static constexpr double kNear_m = 1.5;        ///< nearer, no better place is looked for
   static constexpr double kWorthwhile_m = 0.3;  ///< gain in distance
@@ -59,11 +59,12 @@ Result<std::optional<Hypothesis>> LoopVerification::test_predicted_place() {
 
 Status LoopVerification::test_nearer_place(Hypothesis& answer) {
   if (!context_.parameters.geometric.overhead_search || answer.distance_m() < NearerPlace::kNear_m) return ok();
-  const auto nearest =
+  auto nearest =
       nearest_place(context_.places, answer.candidate.match, answer.geometric->T_match_query, context_.newest);
   if (!nearest) return ok();
   const double nearest_m = nearest->T_match_query.translation().norm();
   if (nearest_m + NearerPlace::kWorthwhile_m > answer.distance_m()) return ok();
+  nearest->log_odds = answer.geometric->log_odds;
   auto tested = registration_.test(*nearest);
   if (!tested) return tested.error();
   hypotheses_.push_back(*std::move(tested));

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include <revisit/core/ids.hpp>
+#include <revisit/core/refusal.hpp>
+#include <revisit/core/trajectory_point.hpp>
+#include <revisit/verification/loop_following.hpp>
+
+namespace revisit {
+
+/// Odometry drifts, but not without bounds: a place that lies farther from the query than that cannot be its place,
+/// however much it looks like it (an aisle, a corridor of another storey). The bound is several times the drift of
+/// LiDAR odometry. Nothing is refused where one of the two has no point, or where tracking was lost in between.
+std::optional<Refusal> refuse_elsewhere(const std::optional<TrajectoryPoint>& place,
+                                        const std::optional<TrajectoryPoint>& query);
+
+/// Frames of places that are elsewhere than the point even by half of that bound, the newest first, at most 60: what
+/// is learnt from them may be wrong now and then.
+std::vector<FrameId> places_elsewhere(const TrajectoryPoints& places, const TrajectoryPoint& point);
+
+}  // namespace revisit

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/verification/elsewhere.hpp>
+
+#include <gtest/gtest.h>
+
+namespace revisit {
+namespace {
+
+TEST(Elsewhere, IsWhatOdometryCannotBeWrongAbout) {
+  const TrajectoryPoint place{.segment = 1, .origin = 1};
+  TrajectoryPoint query = place;
+  for (int metre = 0; metre < 100; ++metre) query = query.after(planar_pose(1.0, 0.0, 0.0));
+  const auto refusal = refuse_elsewhere(place, query);  // 100 m away after 100 m
+  ASSERT_TRUE(refusal);
+  EXPECT_EQ(refusal->reason, Refusal::Reason::kElsewhere);
+  EXPECT_DOUBLE_EQ(refusal->value, 100.0);
+  EXPECT_DOUBLE_EQ(refusal->limit, 25.0);
+
+  TrajectoryPoint back = query;
+  back.T_segment_lidar = planar_pose(20.0, 0.0, 0.0);
+  EXPECT_FALSE(refuse_elsewhere(place, back)) << "20 m away after 100 m: that may be drift";
+  back.T_segment_lidar = planar_pose(40.0, 0.0, 0.0);
+  EXPECT_TRUE(refuse_elsewhere(place, back));
+  back.turned_rad = 200.0;
+  EXPECT_FALSE(refuse_elsewhere(place, back)) << "turns bring drift as well";
+}
+
+TEST(Elsewhere, IsNotKnownWithoutOdometry) {
+  const TrajectoryPoint place{.segment = 1, .origin = 1};
+  TrajectoryPoint query = place.after(planar_pose(1000.0, 0.0, 0.0));
+  EXPECT_TRUE(refuse_elsewhere(place, query));
+  EXPECT_FALSE(refuse_elsewhere(std::nullopt, query));
+  EXPECT_FALSE(refuse_elsewhere(place, std::nullopt));
+  EXPECT_TRUE(refuse_elsewhere(place, place.after_gap(planar_pose(1000.0, 0.0, 0.0), 2.0)));
+  EXPECT_FALSE(refuse_elsewhere(place, place.after_gap(planar_pose(1000.0, 0.0, 0.0), 1000.0)));
+  EXPECT_FALSE(refuse_elsewhere(place, query.lost())) << "tracking was lost in between";
+}
+
+TEST(PlacesElsewhere, AreThoseThatOdometryKnowsToBe) {
+  TrajectoryPoints places;
+  TrajectoryPoint point{.segment = 3};
+  for (int frame = 0; frame < 40; ++frame) {  // a metre a frame
+    places[FrameId{frame}] = point;
+    point = point.after(planar_pose(1.0, 0.0, 0.0));
+  }
+  places[FrameId{5}].reset();
+  EXPECT_EQ(places_elsewhere(places, point).back().value, 6) << "beyond a place without a point, nothing is known";
+  places.erase(FrameId{5});
+  const auto known = places_elsewhere(places, point);
+  ASSERT_FALSE(known.empty());
+  EXPECT_EQ(known.front().value, 24) << "16 m before: 15 m and a twentieth of the way";
+  EXPECT_EQ(known.back().value, 0);
+  EXPECT_TRUE(places_elsewhere(places, point.lost()).empty());
+}
+
+}  // namespace
+}  // namespace revisit
