@@ -103,7 +103,7 @@ int main(int argc, char** argv) {
     close += found->is_accepted() && off_m <= 0.5 && off_deg <= 3.0;
     wrong += found->is_accepted() && !is_near;
     found_unaccepted += !found->is_accepted() && is_near;
-    std::printf("%zu,%zu,%.2f,%.3f,%.2f,%d,%.3f,%.3f,\"%s\"\n", pair.target, pair.source, T_true.translation().norm(),
+    std::printf("%zu,%zu,%.2f,%.3f,%.2f,%d,%.12f,%.3f,\"%s\"\n", pair.target, pair.source, T_true.translation().norm(),
                 off_m, off_deg, found->is_accepted(), found->probability, found->inlier_ratio,
                 found->refusal ? to_text(*found->refusal).c_str() : "");
   }

@@ -16,8 +16,10 @@ import numpy as np
 
 RIGHT_M, RIGHT_DEG = 0.5, 3.0  # docs/evaluation.md
 WRONG_M, WRONG_DEG = 2.0, 10.0  # in between, the place is right and the pose poor: nothing is learnt from it
-NAMES = ["inlier_share", "free_space", "intensity", "rmse", "overlap", "least_fixed", "few"]
-WITHOUT_INTENSITY = [0, 1, 3, 4, 5, 6]
+NAMES = ["inlier_share", "free_space", "intensity", "rmse", "least_fixed", "few"]
+WITHOUT_INTENSITY = [0, 1, 3, 4, 5]
+REGULARISED = 2e-2
+FINE_M = 0.75  # below, voxels are those of scans that are thinned finely (docs/method.md, section 7)
 
 
 def matrix(x, y, z, qx, qy, qz, qw):
@@ -32,7 +34,7 @@ def matrix(x, y, z, qx, qy, qz, qw):
 def load(folder):
     """Evidence (one row a registered candidate), whether its pose is right, and its query."""
     poses = [matrix(*row[1:]) for row in np.loadtxt(folder / "poses.tum")]
-    X, right, queries = [], [], []
+    X, right, queries, fine = [], [], [], []
     with open(folder / "evidence.csv", encoding="ascii") as stream:
         for row in csv.DictReader(stream):
             free, inliers = float(row["free_space_agreement"]), float(row["inlier_ratio"])
@@ -48,51 +50,69 @@ def load(folder):
                 continue
             X.append([min(float(row["inlier_share"]) / (1.0 - 0.3 * distance), 1.1), -np.log(1.004 - free),
                       np.clip(float(row["intensity_agreement"] or 0.0), -0.2, 1.1),
-                      float(row["rmse_m"]) / float(row.get("voxel_m") or 1.0), float(row["overlap"]),
+                      float(row["rmse_m"]) / float(row.get("voxel_m") or 1.0),
                       max(0.0, float(row["least_fixed"]))**0.5,
                       np.log(np.clip(float(row["inliers"]), 10.0, 300.0) / 300.0)])
             right.append(is_right)
             queries.append(int(row["query"]))
-    return np.array(X), np.array(right), np.array(queries)
+            fine.append(float(row.get("voxel_m") or 1.0) < FINE_M)
+    return np.array(X), np.array(right), np.array(queries), np.array(fine)
 
 
-def learn(recordings, columns):
-    """Logistic regression, slightly regularised, by Newton's method."""
-    X = np.concatenate([r[0][:, columns] for r in recordings])
-    y = np.concatenate([r[1] for r in recordings]).astype(float)
-    # A recording without wrong poses gives no weight to them.
-    w = np.concatenate([np.where(r[1], 500 / max(30, r[1].sum()), 500 / max(30, (~r[1]).sum())) for r in recordings])
-    mean, spread = X.mean(0), X.std(0)
-    Z = np.c_[(X - mean) / spread, np.ones(len(X))]
-    penalty = 1e-3 * w.sum() * np.diag([1.0] * len(columns) + [0.0])
+def of_scale(recording, fine):
+    """What was thinned finely, or what was not; None where there is too little of it to learn from."""
+    chosen = recording[3] == fine
+    return tuple(each[chosen] for each in recording) if chosen.sum() > 50 else None
+
+
+def newton(Z, y, w, penalty):
+    """Weighted logistic regression."""
     b = np.zeros(Z.shape[1])
     for _ in range(50):
         p = 1 / (1 + np.exp(-Z @ b))
         H = (Z * (w * p * (1 - p) + 1e-12)[:, None]).T @ Z + penalty
         b -= np.linalg.solve(H, Z.T @ (w * (p - y)) + penalty @ b)
+    return b
+
+
+def learn(recordings, columns):
+    """Logistic regression, regularised so that no single measure decides (residuals differ from sensor to sensor), then
+    scaled so that its probabilities are right (Platt)."""
+    X = np.concatenate([r[0][:, columns] for r in recordings])
+    y = np.concatenate([r[1] for r in recordings]).astype(float)
+    # A recording without wrong poses gives no weight to them.
+    w = np.concatenate([np.where(r[1], 500 / max(30, r[1].sum()), 500 / max(30, (~r[1]).sum())) for r in recordings])
+    mean, spread = X.mean(0), X.std(0)
+    ones = np.ones((len(X), 1))
+    b = newton(np.c_[(X - mean) / spread, ones], y, w, REGULARISED * w.sum() * np.diag([1.0] * len(columns) + [0.0]))
     slopes = b[:-1] / spread
-    return slopes, b[-1] - slopes @ mean
+    constant = b[-1] - slopes @ mean
+    scale, more = newton(np.c_[X @ slopes + constant, ones], y, w, np.zeros((2, 2)))
+    return scale * slopes, scale * constant + more
 
 
 def main():
     folders = [pathlib.Path(a) for a in sys.argv[1:]]
     if not folders:
         sys.exit(__doc__)
-    recordings = [load(f) for f in folders]
-    for title, columns in (("with intensity", list(range(len(NAMES)))), ("without", WITHOUT_INTENSITY)):
-        slopes, constant = learn(recordings, columns)
-        print(title, {NAMES[c]: round(float(s), 3) for c, s in zip(columns, slopes)}, "constant", round(constant, 3))
-        for i, (folder, (X, right, queries)) in enumerate(zip(folders, recordings)):
-            if len(folders) == 1:
-                break
-            s, c = learn(recordings[:i] + recordings[i + 1:], columns)
-            odds, own = X[:, columns] @ s + c, X[:, columns] @ slopes + constant
-            found = {q: max(odds[right & (queries == q)]) for q in set(queries[right])}
-            best = np.array(list(found.values()))
-            taken = [f"{(best > t).sum()}/{(odds[~right] > t).sum()}" for t in (0.0, 1.0, 3.0, 5.0)]
-            print(f"  {folder.name}: {right.sum()} right, {(~right).sum()} wrong; learnt on the others, of {len(best)} "
-                  f"queries found / wrong ones taken at log odds 0, 1, 3, 5: {', '.join(taken)}; most of a wrong one "
-                  f"{odds[~right].max(initial=-99):.2f}, {own[~right].max(initial=-99):.2f} learnt on all")
+    everything = [load(f) for f in folders]
+    for fine in (False, True):
+        pairs = [(f.name, of_scale(r, fine)) for f, r in zip(folders, everything)]
+        names, recordings = zip(*[(name, r) for name, r in pairs if r is not None])
+        for intensity, columns in ((True, list(range(len(NAMES)))), (False, WITHOUT_INTENSITY)):
+            slopes, constant = learn(recordings, columns)
+            print("fine" if fine else "coarse", "with intensity" if intensity else "without",
+                  {NAMES[c]: round(float(s), 3) for c, s in zip(columns, slopes)}, "constant", round(constant, 3))
+            for i, (name, (X, right, queries, _)) in enumerate(zip(names, recordings)):
+                if len(recordings) == 1:
+                    break
+                s, c = learn(recordings[:i] + recordings[i + 1:], columns)
+                odds, own = X[:, columns] @ s + c, X[:, columns] @ slopes + constant
+                best = np.array([max(odds[right & (queries == q)]) for q in set(queries[right])])
+                taken = [f"{(best > t).sum()}/{(odds[~right] > t).sum()}" for t in (0.0, 1.0, 3.0, 5.0)]
+                print(f"  {name}: {right.sum()} right, {(~right).sum()} wrong; learnt on the others, of {len(best)} "
+                      f"queries found / wrong ones taken at log odds 0, 1, 3, 5: {', '.join(taken)}; most of a wrong "
+                      f"one {odds[~right].max(initial=-99):.2f}, {own[~right].max(initial=-99):.2f} learnt on all")
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ struct Refusal {
     kNoCandidate,             ///< no place passed the thresholds of retrieval
     kNoPose,                  ///< the method retrieves only: there is nothing to verify
     kElsewhere,               ///< by odometry, metres
+    kOtherHeading,            ///< than by odometry, degrees
     kLowOverlap,              ///< seen from overhead
     kTemporallyInconsistent,  ///< the frames before do not match (eq. 11)
     kFewInliers,

@@ -21,6 +21,8 @@ inline std::string to_text(const Refusal& refusal) {
       return "retrieval only: no pose to verify";
     case Reason::kElsewhere:
       return format("%.0f m away by odometry: more than %.0f m", value, limit);
+    case Reason::kOtherHeading:
+      return format("turned by %.0f deg against odometry: more than %.0f deg", value, limit);
     case Reason::kLowOverlap:
       return format("overlap seen from overhead %.2f below %.2f", value, limit);
     case Reason::kTemporallyInconsistent:

@@ -30,16 +30,13 @@ struct TrajectoryPoint {
             origin,
             off_m};
   }
-  /// The first point of the next segment, where the motion in between was only predicted: off by so many metres at
-  /// most.
-  TrajectoryPoint after_gap(const Pose& T_predicted_here_next, double off_m) const {
-    TrajectoryPoint next = after(T_predicted_here_next);
+  /// The first point of the next segment, where tracking failed in between: off by so many metres at most.
+  TrajectoryPoint after_gap(const Pose& T_here_next, double off_m) const {
+    TrajectoryPoint next = after(T_here_next);
     ++next.segment;
     next.off_m += off_m;
     return next;
   }
-  /// The first point of a segment of which is not known how it lies to those before.
-  TrajectoryPoint lost() const { return {.segment = segment + 1, .origin = origin + 1}; }
   /// The same as after(), where the pose of the next one is known.
   TrajectoryPoint to(const Pose& T_segment_next) const {
     TrajectoryPoint next = after(T_segment_lidar.inverse() * T_segment_next);

@@ -32,6 +32,7 @@ struct Matching {
 
   static constexpr double kFewestMatched = 0.3;  ///< share of the points of a scan that is tracked
   static constexpr double kBelowTypical = 0.2;   ///< what it may fall below the running mean
+  static constexpr double kOfTypical = 0.7;      ///< share of a running mean that is low itself, of a sparse sensor
   // Scans slide along what hardly fixes them, a wall or a corridor. There, what carries a sensor brakes and jolts no
   // harder than this.
   static constexpr double kHardlyFixed = 0.1;  ///< share of all that fixes the position
@@ -117,7 +118,8 @@ double ScanMatcher::search_radius_m() const {
 bool ScanMatcher::is_credible(double matched, double met) const {
   if (scans_ < Matching::kFirstScans)
     return matched >= Matching::kFewestMatchedAtFirst && matched >= Matching::kFittingAtFirst * met;
-  return matched >= std::max(Matching::kFewestMatched, typical_match_ - Matching::kBelowTypical);
+  return matched >= std::max(std::min(Matching::kFewestMatched, Matching::kOfTypical * typical_match_),
+                             typical_match_ - Matching::kBelowTypical);
 }
 
 ScanMatch ScanMatcher::match(double stamp_s, const MatcherScan& scan,
@@ -155,11 +157,13 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
     return icp;
   };
   const double gap_s = stamp_s - last_stamp_s_;
+  // Since the last scan that was tracked: the longer ago, the farther may the sensor be from where it was predicted.
+  const double untracked_s = stamp_s - tracked_stamp_s_;
   const auto is_possible = [&](const IcpResult& icp) {
     if (!motion_ || gap_s <= 0.0) return true;
     const Pose surprise = (T_odom_lidar_ * T_predicted).inverse() * icp.T_target_source;
     return slid_m(icp.information, surprise.translation()) <=
-           Matching::kJolt_m + 0.5 * Matching::kMostAcceleration_mps2 * gap_s * gap_s;
+           Matching::kJolt_m + 0.5 * Matching::kMostAcceleration_mps2 * untracked_s * untracked_s;
   };
   const auto fits = [&](const IcpResult& icp) {
     return icp.converged && is_credible(icp.matched, icp.met) && is_possible(icp);
@@ -215,6 +219,7 @@ void ScanMatcher::accept(double stamp_s, const MatcherScan& scan, const ScanMatc
         if (forgets) map->forget_far_from(here);
       });
   last_stamp_s_ = stamp_s;
+  if (match.is_tracked) tracked_stamp_s_ = stamp_s;
   ++scans_;
 }
 
@@ -227,7 +232,7 @@ void ScanMatcher::restart() {
 }
 
 void ScanMatcher::restore(double stamp_s, const Pose& T_odom_lidar, const std::optional<Twist>& motion) {
-  last_stamp_s_ = stamp_s;
+  last_stamp_s_ = tracked_stamp_s_ = stamp_s;
   T_odom_lidar_ = T_odom_lidar;
   motion_ = motion;
   // How well scans typically match is to be learnt again.

@@ -9,7 +9,7 @@
 namespace revisit {
 namespace {
 
-constexpr double kGap_m = 2.0;  // that a sensor may have moved otherwise than predicted, from scan to scan
+constexpr double kFastest_mps = 20.0;  // how much farther a sensor may have come than odometry says, while untracked
 
 }  // namespace
 
@@ -56,7 +56,7 @@ Result<LoopDetector::Prepared> LoopDetector::follow_and_prepare(Scan scan) {
   auto prepared = preparation_.prepare(std::move(scan), step.motion);
   if (!prepared) {
     previous_.reset();
-    point_ = point_.lost();
+    point_ = {.segment = point_.segment + 1, .origin = ++origins_};
     return prepared.error();
   }
   prepared->geometry = std::make_shared<ScanGeometry>(prepared->cloud);
@@ -69,9 +69,20 @@ Result<LoopDetector::Prepared> LoopDetector::follow_and_prepare(Scan scan) {
 TrajectoryPoint LoopDetector::next_point(const OdometryStep& step, PreparedScan& prepared) {
   const bool is_connected =
       step.is_connected && previous_ && typical_.add(*previous_, *prepared.geometry, step.T_previous_lidar);
-  if (is_connected) return point_.after(step.T_previous_lidar);
-  typical_.interrupt();
-  return step.lost ? point_.lost() : point_.after_gap(step.T_previous_lidar, kGap_m);
+  TrajectoryPoint point;
+  if (is_connected) {
+    point = point_.after(step.T_previous_lidar);
+  } else {
+    typical_.interrupt();
+    // Back on the map that it was lost on for a moment; else, nothing is known any more.
+    const bool is_back = step.is_tracked && !step.is_connected && tracked_ && tracked_->segment == step.segment;
+    point = is_back ? tracked_->point.after_gap(tracked_->T_odom_lidar.inverse() * step.T_odom_lidar,
+                                                kFastest_mps * (step.stamp_s - tracked_->stamp_s))
+                    : TrajectoryPoint{.origin = ++origins_};
+    point.segment = point_.segment + 1;
+  }
+  if (is_connected || step.is_tracked) tracked_ = {point, step.segment, step.T_odom_lidar, step.stamp_s};
+  return point;
 }
 
 Status LoopDetector::remember(PreparedScan prepared, const std::optional<Pose>& T_world_lidar) {

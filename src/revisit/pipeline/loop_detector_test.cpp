@@ -88,11 +88,11 @@ Scan blocked(Scan scan, double open_deg) {
 TEST(LoopDetector, ALoopIsFollowedPastWhatStandsInTheWay) {
   const SyntheticWorld world(51);
   const auto at = [](int i) { return SyntheticWorld::at(-6.0 + i, 0, 0); };
-  constexpr double open_deg = 115.0;
+  constexpr double open_deg = 105.0;
   const auto run = [&](bool follow, int first) {
     Parameters parameters;
     parameters.geometric.follow = follow;
-    parameters.geometric.min_probability = 0.9999;
+    parameters.geometric.min_probability = 0.9999999;
     LoopDetector detector{parameters};
     for (int i = 0; i < 8; ++i) EXPECT_TRUE(detector.process(scan_at(world, i, at(i), static_cast<unsigned>(i))));
     for (int i = first; i < 4; ++i)

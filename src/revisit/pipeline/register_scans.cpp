@@ -18,7 +18,7 @@ constexpr double kReach_m = 12.0;   // scans farther apart share too little
 constexpr std::size_t kStarts = 6;  // poses from overhead that are registered
 // Who asks how two scans lie to each other believes that they show one place; of candidates for a loop nearly all do
 // not. Rooms, which are thinned finely, fit one another, and themselves turned by 90 degrees.
-constexpr double kPrior_log_odds = 4.6, kPriorOfRooms_log_odds = 2.0;
+constexpr double kPrior_log_odds = 8.0, kPriorOfRooms_log_odds = 3.0;
 constexpr double kOther_m = 1.0, kOther_rad = 0.2;  // poses farther apart exclude each other
 
 bool is_other(const Pose& a, const Pose& b) {

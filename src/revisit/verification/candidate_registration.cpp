@@ -141,12 +141,14 @@ void CandidateRegistration::register_scans(Hypothesis& hypothesis, const PosePre
   hypothesis.geometric =
       check_geometric(*hypothesis.geometry, *query_geometry_,
                       {hypothesis.T_guess_match_query, hypothesis.overlap, context_.typical}, options_);
-  double support = context_.following.support_log_odds(
-      query_.trajectory_point, context_.places.at(hypothesis.candidate.match), hypothesis.geometric->T_match_query);
-  if (const Pose& found = hypothesis.geometric->T_match_query;
-      prediction != nullptr && agree(prediction->T_match_query, found, found.translation().norm()))
+  const auto& place = context_.places.at(hypothesis.candidate.match);
+  const Pose& found = hypothesis.geometric->T_match_query;
+  double support = context_.following.support_log_odds(query_.trajectory_point, place, found);
+  if (prediction != nullptr && agree(prediction->T_match_query, found, found.translation().norm()))
     support = std::max(support, LoopFollowing::carried(prediction->log_odds, 0.0));
   decide(*hypothesis.geometric, context_.look_alikes_log_odds, support, options_);
+  if (options_.follow && hypothesis.geometric->is_consistent())
+    hypothesis.geometric->refusal = refuse_heading(place, query_.trajectory_point, found);
   hypothesis.refusal = hypothesis.geometric->refusal;
 }
 

@@ -8,9 +8,12 @@ namespace {
 
 struct Drift {
   static constexpr double kAlways_m = 15.0;      ///< loops reach so far
-  static constexpr double kShare = 0.1;          ///< of the motion in between
+  static constexpr double kShare = 0.06;         ///< of the motion in between
   static constexpr double kMetresARadian = 2.0;  ///< a turn brings as much drift as so many metres
-  static constexpr double kShareToLearn = 0.05;
+  static constexpr double kPose_m = 1.0;         ///< of registered poses
+  static constexpr double kShareToLearn = 0.03;
+  // Of the heading.
+  static constexpr double kAlways_deg = 40.0, kDegreesAMetre = 0.02;
 };
 constexpr std::size_t kMostPlaces = 60;
 
@@ -20,7 +23,8 @@ struct Apart {
         motion_m(std::abs(b.travelled_m - a.travelled_m) +
                  Drift::kMetresARadian * std::abs(b.turned_rad - a.turned_rad)),
         off_m(std::abs(b.off_m - a.off_m)) {}
-  double most_m(double share) const { return Drift::kAlways_m + off_m + share * motion_m; }
+  double drift_m(double share) const { return off_m + share * motion_m; }
+  double most_m(double share) const { return Drift::kAlways_m + drift_m(share); }
   double m, motion_m, off_m;
 };
 
@@ -32,6 +36,21 @@ std::optional<Refusal> refuse_elsewhere(const std::optional<TrajectoryPoint>& pl
   const Apart apart(*place, *query);
   if (apart.m <= apart.most_m(Drift::kShare)) return std::nullopt;
   return Refusal{Refusal::Reason::kElsewhere, apart.m, apart.most_m(Drift::kShare)};
+}
+
+std::optional<Refusal> refuse_heading(const std::optional<TrajectoryPoint>& place,
+                                      const std::optional<TrajectoryPoint>& query, const Pose& T_place_query) {
+  if (!place || !query || place->origin != query->origin) return std::nullopt;
+  const double off_deg = to_degrees(rotation_angle(T_between(*place, *query).inverse() * T_place_query));
+  const double most_deg = Drift::kAlways_deg + Drift::kDegreesAMetre * Apart(*place, *query).motion_m;
+  if (off_deg <= most_deg) return std::nullopt;
+  return Refusal{Refusal::Reason::kOtherHeading, off_deg, most_deg};
+}
+
+bool are_other_poses(const TrajectoryPoint& a, const Pose& T_a_query, const TrajectoryPoint& b, const Pose& T_b_query) {
+  if (a.origin != b.origin) return false;
+  const Pose apart = (T_between(b, a) * T_a_query).inverse() * T_b_query;
+  return apart.translation().norm() > Drift::kPose_m + Apart(a, b).drift_m(Drift::kShare);
 }
 
 std::vector<FrameId> places_elsewhere(const TrajectoryPoints& places, const TrajectoryPoint& point) {

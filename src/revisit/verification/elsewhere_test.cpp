@@ -6,6 +6,8 @@
 namespace revisit {
 namespace {
 
+const TrajectoryPoint lost{.segment = 9, .origin = 9};
+
 TEST(Elsewhere, IsWhatOdometryCannotBeWrongAbout) {
   const TrajectoryPoint place{.segment = 1, .origin = 1};
   TrajectoryPoint query = place;
@@ -14,7 +16,7 @@ TEST(Elsewhere, IsWhatOdometryCannotBeWrongAbout) {
   ASSERT_TRUE(refusal);
   EXPECT_EQ(refusal->reason, Refusal::Reason::kElsewhere);
   EXPECT_DOUBLE_EQ(refusal->value, 100.0);
-  EXPECT_DOUBLE_EQ(refusal->limit, 25.0);
+  EXPECT_DOUBLE_EQ(refusal->limit, 21.0);
 
   TrajectoryPoint back = query;
   back.T_segment_lidar = planar_pose(20.0, 0.0, 0.0);
@@ -25,6 +27,17 @@ TEST(Elsewhere, IsWhatOdometryCannotBeWrongAbout) {
   EXPECT_FALSE(refuse_elsewhere(place, back)) << "turns bring drift as well";
 }
 
+TEST(Elsewhere, IsWhatLooksTheSameTurned) {
+  const TrajectoryPoint place{.segment = 1};
+  const TrajectoryPoint query = place.after(planar_pose(10.0, 0.0, to_radians(30.0)));
+  EXPECT_FALSE(refuse_heading(place, query, planar_pose(8.0, 0.0, to_radians(60.0))));
+  const auto refusal = refuse_heading(place, query, planar_pose(8.0, 0.0, to_radians(120.0)));
+  ASSERT_TRUE(refusal);
+  EXPECT_EQ(refusal->reason, Refusal::Reason::kOtherHeading);
+  EXPECT_NEAR(refusal->value, 90.0, 1e-9);
+  EXPECT_FALSE(refuse_heading(place, lost, planar_pose(8.0, 0.0, to_radians(120.0))));
+}
+
 TEST(Elsewhere, IsNotKnownWithoutOdometry) {
   const TrajectoryPoint place{.segment = 1, .origin = 1};
   TrajectoryPoint query = place.after(planar_pose(1000.0, 0.0, 0.0));
@@ -33,7 +46,7 @@ TEST(Elsewhere, IsNotKnownWithoutOdometry) {
   EXPECT_FALSE(refuse_elsewhere(place, std::nullopt));
   EXPECT_TRUE(refuse_elsewhere(place, place.after_gap(planar_pose(1000.0, 0.0, 0.0), 2.0)));
   EXPECT_FALSE(refuse_elsewhere(place, place.after_gap(planar_pose(1000.0, 0.0, 0.0), 1000.0)));
-  EXPECT_FALSE(refuse_elsewhere(place, query.lost())) << "tracking was lost in between";
+  EXPECT_FALSE(refuse_elsewhere(place, lost)) << "tracking was lost in between";
 }
 
 TEST(PlacesElsewhere, AreThoseThatOdometryKnowsToBe) {
@@ -48,9 +61,9 @@ TEST(PlacesElsewhere, AreThoseThatOdometryKnowsToBe) {
   places.erase(FrameId{5});
   const auto known = places_elsewhere(places, point);
   ASSERT_FALSE(known.empty());
-  EXPECT_EQ(known.front().value, 24) << "16 m before: 15 m and a twentieth of the way";
+  EXPECT_EQ(known.front().value, 24) << "16 m before: 15 m and 3 in a hundred of the way";
   EXPECT_EQ(known.back().value, 0);
-  EXPECT_TRUE(places_elsewhere(places, point.lost()).empty());
+  EXPECT_TRUE(places_elsewhere(places, lost).empty());
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ struct Tail {
   static constexpr std::size_t kFewestRegistered = 10;     ///< for a tail
   static constexpr double kRare = 1e-3;                    ///< share of the places elsewhere that would reach the end
   static constexpr double kUsualEnd = 3.0;                 ///< of the recordings that the model was learnt on
-  static constexpr double kMostCaution = 4.0;              ///< log odds
+  static constexpr double kMostCaution = 3.0;              ///< log odds
   static constexpr double kDoubt = 30.0;                   ///< scores by which what is usual counts
 };
 

@@ -8,12 +8,20 @@ namespace revisit {
 namespace {
 
 struct Coefficients {
-  double inlier_share, free_space, intensity, rmse, overlap, least_fixed, few, constant;
+  double inlier_share, free_space, intensity, rmse, least_fixed, few, constant;
 };
 
-// Learnt by scripts/learn_probability.py.
-constexpr Coefficients kWithIntensity{16.76, 2.089, 7.746, -11.44, -16.78, 7.027, 4.942, -12.58};
-constexpr Coefficients kWithoutIntensity{16.71, 1.89, 0.0, -10.66, -14.75, 8.38, 3.99, -8.246};
+// Learnt by scripts/learn_probability.py: of scans thinned as in the open, and as in rooms and with a narrow view.
+// There, places resemble one another more, and the same measures say less.
+struct Scale {
+  static constexpr double kFine_m = 0.75;
+  Coefficients with_intensity, without;
+};
+// What few inliers say in the open is taken from rooms: there are hardly any such pairs to learn from.
+constexpr Scale kCoarse{{12.448, 2.828, 9.638, -54.12, 28.69, 3.394, -27.01},
+                        {13.11, 2.908, 0.0, -40.68, 25.25, 2.708, -20.67}};
+constexpr Scale kFine{{11.0, 1.463, 7.001, -24.53, 7.896, 3.394, -18.58},
+                      {12.77, 1.27, 0.0, -32.06, 9.527, 2.708, -13.76}};
 // Beyond these, nothing was learnt.
 constexpr double kFarthest_m = 12.0, kMostShare = 1.1, kFewestInliers = 10.0;
 constexpr double kEnoughInliers = 300.0;  // fewer may fit by chance
@@ -22,14 +30,14 @@ constexpr double kUnseenAMetre = 0.03;    // share of what fits that is out of s
 }  // namespace
 
 double loop_log_odds(const LoopEvidence& evidence) {
-  const Coefficients& c = evidence.intensity_agreement ? kWithIntensity : kWithoutIntensity;
+  const Scale& scale = evidence.voxel_m < Scale::kFine_m ? kFine : kCoarse;
+  const Coefficients& c = evidence.intensity_agreement ? scale.with_intensity : scale.without;
   // Disagreement counts by its order of magnitude: one point in a hundred seen through, or three.
   const double free_space = -std::log(1.004 - std::clamp(evidence.free_space_agreement, 0.0, 1.0));
   const double in_sight = 1.0 - kUnseenAMetre * std::min(evidence.distance_m, kFarthest_m);
   return c.constant + c.inlier_share * std::min(evidence.inlier_share / in_sight, kMostShare) +
          c.free_space * free_space + c.intensity * std::clamp(evidence.intensity_agreement.value_or(0.0), -0.2, 1.1) +
-         c.rmse * evidence.rmse_m / evidence.voxel_m + c.overlap * evidence.overlap +
-         c.least_fixed * std::sqrt(std::max(0.0, evidence.least_fixed)) +
+         c.rmse * evidence.rmse_m / evidence.voxel_m + c.least_fixed * std::sqrt(std::max(0.0, evidence.least_fixed)) +
          c.few * std::log(std::clamp(static_cast<double>(evidence.inliers), kFewestInliers, kEnoughInliers) /
                           kEnoughInliers);
 }

@@ -2,6 +2,10 @@
 #include <revisit/verification/loop_verification.hpp>
 
 #include <algorithm>
+#include <cmath>
+
+#include <revisit/verification/acceptance.hpp>
+#include <revisit/verification/elsewhere.hpp>
 
 namespace revisit {
 namespace {
@@ -32,12 +36,38 @@ Result<std::optional<Hypothesis>> LoopVerification::verify(std::span<const LoopC
     hypotheses_.push_back(*there);
   if (hypotheses_.empty()) return std::optional<Hypothesis>();
 
+  weigh_against_each_other();
   std::optional<Hypothesis> best =
       *std::max_element(hypotheses_.begin(), hypotheses_.end(),
                         [](const Hypothesis& a, const Hypothesis& b) { return a.score() < b.score(); });
   if (best->is_accepted())
     if (const Status status = test_nearer_place(*best); !status) return status.error();
   return best;
+}
+
+// The query stands at one pose: what another explains better speaks against this one.
+void LoopVerification::weigh_against_each_other() {
+  std::vector<double> log_odds;
+  log_odds.reserve(hypotheses_.size());
+  for (const Hypothesis& each : hypotheses_) log_odds.push_back(each.geometric ? each.geometric->log_odds : 0.0);
+  for (std::size_t i = 0; i < hypotheses_.size(); ++i) {
+    if (!hypotheses_[i].is_accepted()) continue;
+    double others = 0.0;
+    for (std::size_t j = 0; j < hypotheses_.size(); ++j)
+      if (j != i && hypotheses_[j].geometric && exclude_each_other(hypotheses_[i], hypotheses_[j]))
+        others = std::max(others, std::exp(log_odds[j]));
+    if (others == 0.0) continue;
+    GeometricEvidence& found = *hypotheses_[i].geometric;
+    decide(found, context_.look_alikes_log_odds, log_odds[i] - found.own_log_odds - std::log1p(others),
+           context_.parameters.geometric);
+    hypotheses_[i].refusal = found.refusal;
+  }
+}
+
+bool LoopVerification::exclude_each_other(const Hypothesis& a, const Hypothesis& b) const {
+  const auto &place_a = context_.places.at(a.candidate.match), &place_b = context_.places.at(b.candidate.match);
+  return place_a && place_b &&
+         are_other_poses(*place_a, a.geometric->T_match_query, *place_b, b.geometric->T_match_query);
 }
 
 // Surer by its own evidence than look-alikes are, and near: no candidate can be better.

@@ -25,6 +25,8 @@ class LoopVerification {
  private:
   Result<std::optional<Hypothesis>> test_predicted_place();
   Status test_nearer_place(Hypothesis& answer);
+  void weigh_against_each_other();
+  bool exclude_each_other(const Hypothesis& a, const Hypothesis& b) const;
   bool is_sufficient(const Hypothesis& predicted) const;
 
   const VerificationContext& context_;

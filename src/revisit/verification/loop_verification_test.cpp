@@ -99,6 +99,24 @@ TEST_F(LoopVerificationTest, AnotherWorldIsRefusedForItsOverlapOrItsInliers) {
   }
 }
 
+TEST_F(LoopVerificationTest, OfTwoPlacesThatFitEquallyWellNoneIsSure) {
+  add(80, described(home_, SyntheticWorld::at(2, 0, 0)), points_.at(FrameId{0})->after(planar_pose(40, 0, 0)));
+  const Described query = described(home_, SyntheticWorld::at(2.2, 0.3, 3.0));
+  const VerificationQuery question{FrameId{1000}, query.descriptor, query.cloud, nullptr, std::nullopt};
+  const VerificationContext known = context();
+  for (const int only : {2, 80}) {
+    LoopVerification verification(known, question);
+    const auto answer = verification.verify(candidates(query, {only}));
+    ASSERT_TRUE(answer && *answer);
+    EXPECT_TRUE((*answer)->is_accepted()) << only;
+  }
+  LoopVerification verification(known, question);
+  const auto answer = verification.verify(candidates(query, {2, 80}));
+  ASSERT_TRUE(answer && *answer && (*answer)->refusal);
+  EXPECT_EQ((*answer)->refusal->reason, Refusal::Reason::kImprobable) << "by odometry, they are 38 m apart";
+  EXPECT_NEAR((*answer)->geometric->probability, 0.5, 0.1);
+}
+
 TEST_F(LoopVerificationTest, OfAFarAnswerAndANearerPlaceTheNearerOneIsTested) {
   const Described query = described(home_, SyntheticWorld::at(5.0, 0, 0));
   const VerificationQuery question{FrameId{1000}, query.descriptor, query.cloud, nullptr, std::nullopt};
