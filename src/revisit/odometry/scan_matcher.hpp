@@ -82,7 +82,7 @@ class ScanMatcher {
   std::optional<Twist> motion_;
   Eigen::Vector3f forgotten_from_ = Eigen::Vector3f::Zero();  ///< where the map was last cut to its reach
   double last_stamp_s_ = 0.0, range_m_ = 0.0;
-  double tracked_stamp_s_ = 0.0;  ///< of the last scan that was tracked
+  double tracked_stamp_s_ = 0.0;              ///< of the last scan that was tracked
   double squared_prediction_error_m2_ = 0.0;  ///< running mean
   double typical_match_ = 0.0;                ///< running mean of the share that met the map
   int scans_ = 0;                             ///< in the map
