@@ -9,7 +9,7 @@
 namespace revisit {
 namespace {
 
-constexpr double kFastest_mps = 20.0;  // how much farther a sensor may have come than odometry says, while untracked
+constexpr double kGap_m = 0.5;  // what odometry may be off once it is back on its map
 
 }  // namespace
 
@@ -76,12 +76,11 @@ TrajectoryPoint LoopDetector::next_point(const OdometryStep& step, PreparedScan&
     typical_.interrupt();
     // Back on the map that it was lost on for a moment; else, nothing is known any more.
     const bool is_back = step.is_tracked && !step.is_connected && tracked_ && tracked_->segment == step.segment;
-    point = is_back ? tracked_->point.after_gap(tracked_->T_odom_lidar.inverse() * step.T_odom_lidar,
-                                                kFastest_mps * (step.stamp_s - tracked_->stamp_s))
+    point = is_back ? tracked_->point.after_gap(tracked_->T_odom_lidar.inverse() * step.T_odom_lidar, kGap_m)
                     : TrajectoryPoint{.origin = ++origins_};
     point.segment = point_.segment + 1;
   }
-  if (is_connected || step.is_tracked) tracked_ = {point, step.segment, step.T_odom_lidar, step.stamp_s};
+  if (is_connected || step.is_tracked) tracked_ = {point, step.segment, step.T_odom_lidar};
   return point;
 }
 

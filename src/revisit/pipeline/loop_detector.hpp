@@ -47,15 +47,14 @@ class LoopDetector {
   ScanPreparation preparation_;
   PlaceRecognition recognition_;
   TypicalAgreementEstimate typical_;
-  TrajectoryPoint point_;                         ///< of the last scan
+  TrajectoryPoint point_;  ///< of the last scan
   struct Tracked {
     TrajectoryPoint point;
     int segment = 0;  ///< of odometry
     Pose T_odom_lidar = Pose::Identity();
-    double stamp_s = 0.0;
   };
-  std::optional<Tracked> tracked_;  ///< the last scan that odometry tracked
-  int origins_ = 0;                 ///< of trajectory points, so far
+  std::optional<Tracked> tracked_;                ///< the last scan that odometry tracked
+  int origins_ = 0;                               ///< of trajectory points, so far
   std::shared_ptr<const ScanGeometry> previous_;  ///< likewise; null where it described no place
   std::map<FrameId, Pose> T_world_places_;        ///< of places that came with a pose
 };

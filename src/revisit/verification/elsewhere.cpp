@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/verification/elsewhere.hpp>
 
+#include <algorithm>
 #include <cmath>
 
 namespace revisit {
 namespace {
 
 struct Drift {
-  static constexpr double kAlways_m = 15.0;      ///< loops reach so far
-  static constexpr double kShare = 0.06;         ///< of the motion in between
-  static constexpr double kMetresARadian = 2.0;  ///< a turn brings as much drift as so many metres
-  static constexpr double kPose_m = 1.0;         ///< of registered poses
+  static constexpr double kAlways_m = 15.0;                        ///< loops reach so far
+  static constexpr double kShare = 0.06;                           ///< of the motion in between
+  static constexpr double kMetresARadian = 2.0;                    ///< a turn brings as much drift as so many metres
+  static constexpr double kPose_m = 1.0;                           ///< of registered poses
+  static constexpr double kDeviation_m = 5.0, kUsualShare = 0.01;  ///< what is usual
+  static constexpr double kMost_log_odds = 8.0;
   static constexpr double kShareToLearn = 0.03;
   // Of the heading.
   static constexpr double kAlways_deg = 40.0, kDegreesAMetre = 0.02;
@@ -45,6 +48,14 @@ std::optional<Refusal> refuse_heading(const std::optional<TrajectoryPoint>& plac
   const double most_deg = Drift::kAlways_deg + Drift::kDegreesAMetre * Apart(*place, *query).motion_m;
   if (off_deg <= most_deg) return std::nullopt;
   return Refusal{Refusal::Reason::kOtherHeading, off_deg, most_deg};
+}
+
+double odometry_log_odds(const std::optional<TrajectoryPoint>& place, const std::optional<TrajectoryPoint>& query,
+                         const Pose& T_place_query) {
+  if (!place || !query || place->origin != query->origin) return 0.0;
+  const double off_m = (T_between(*place, *query).inverse() * T_place_query).translation().norm();
+  const double deviation_m = Drift::kDeviation_m + Apart(*place, *query).drift_m(Drift::kUsualShare);
+  return -std::min(0.5 * std::pow(off_m / deviation_m, 2), Drift::kMost_log_odds);
 }
 
 bool are_other_poses(const TrajectoryPoint& a, const Pose& T_a_query, const TrajectoryPoint& b, const Pose& T_b_query) {

@@ -21,6 +21,12 @@ std::optional<Refusal> refuse_elsewhere(const std::optional<TrajectoryPoint>& pl
 std::optional<Refusal> refuse_heading(const std::optional<TrajectoryPoint>& place,
                                       const std::optional<TrajectoryPoint>& query, const Pose& T_place_query);
 
+/// Log odds that odometry takes from a pose, 0 or less: those of a Gaussian whose deviation is 5 m and a hundredth of
+/// the motion in between, at most 8, since odometry may have gone wrong. Like houses in a row are told apart by nothing
+/// else.
+double odometry_log_odds(const std::optional<TrajectoryPoint>& place, const std::optional<TrajectoryPoint>& query,
+                         const Pose& T_place_query);
+
 /// Whether a query that stands at one pose relative to place `a`, as found, cannot stand at the other relative to `b`.
 bool are_other_poses(const TrajectoryPoint& a, const Pose& T_a_query, const TrajectoryPoint& b, const Pose& T_b_query);
 

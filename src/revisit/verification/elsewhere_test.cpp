@@ -38,6 +38,16 @@ TEST(Elsewhere, IsWhatLooksTheSameTurned) {
   EXPECT_FALSE(refuse_heading(place, lost, planar_pose(8.0, 0.0, to_radians(120.0))));
 }
 
+TEST(Elsewhere, IsTheLessLikelyTheFartherOdometryIs) {
+  const TrajectoryPoint place{.segment = 1, .origin = 1};
+  const TrajectoryPoint query = place.after(planar_pose(500.0, 0.0, 0.0));  // a deviation of 10 m
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, planar_pose(500.0, 0.0, 0.0)), 0.0);
+  EXPECT_NEAR(odometry_log_odds(place, query, planar_pose(490.0, 0.0, 0.0)), -0.5, 1e-9);
+  EXPECT_NEAR(odometry_log_odds(place, query, planar_pose(470.0, 0.0, 0.0)), -4.5, 1e-9);
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, planar_pose(0.0, 0.0, 0.0)), -8.0);
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, lost, planar_pose(0.0, 0.0, 0.0)), 0.0);
+}
+
 TEST(Elsewhere, IsNotKnownWithoutOdometry) {
   const TrajectoryPoint place{.segment = 1, .origin = 1};
   TrajectoryPoint query = place.after(planar_pose(1000.0, 0.0, 0.0));
