@@ -80,7 +80,7 @@ TrajectoryPoint LoopDetector::next_point(const OdometryStep& step, PreparedScan&
                     : TrajectoryPoint{.origin = ++origins_};
     point.segment = point_.segment + 1;
   }
-  if (is_connected || step.is_tracked) tracked_ = {point, step.segment, step.T_odom_lidar};
+  if (step.is_tracked) tracked_ = {point, step.segment, step.T_odom_lidar};
   return point;
 }
 

@@ -17,7 +17,7 @@ namespace revisit {
 std::optional<Refusal> refuse_elsewhere(const std::optional<TrajectoryPoint>& place,
                                         const std::optional<TrajectoryPoint>& query);
 
-/// The same of the heading, once a pose is found: rooms fit when turned by 90 degrees.
+/// The same for the heading of a pose that was found: rooms also fit when turned by 90 degrees.
 std::optional<Refusal> refuse_heading(const std::optional<TrajectoryPoint>& place,
                                       const std::optional<TrajectoryPoint>& query, const Pose& T_place_query);
 
@@ -27,11 +27,12 @@ std::optional<Refusal> refuse_heading(const std::optional<TrajectoryPoint>& plac
 double odometry_log_odds(const std::optional<TrajectoryPoint>& place, const std::optional<TrajectoryPoint>& query,
                          const Pose& T_place_query);
 
-/// Whether a query that stands at one pose relative to place `a`, as found, cannot stand at the other relative to `b`.
+/// Whether a query cannot stand at both poses at once, one found relative to place `a`, the other to `b`; false where
+/// odometry does not know how the places lie to each other.
 bool are_other_poses(const TrajectoryPoint& a, const Pose& T_a_query, const TrajectoryPoint& b, const Pose& T_b_query);
 
-/// Frames of places that are elsewhere than the point even by half of that bound, the newest first, at most 60: what
-/// is learnt from them may be wrong now and then.
+/// Frames of places that are elsewhere than the point if odometry drifts half as much (3 % of the way), the newest
+/// first, at most 60: what is learnt from them may be wrong now and then.
 std::vector<FrameId> places_elsewhere(const TrajectoryPoints& places, const TrajectoryPoint& point);
 
 }  // namespace revisit
