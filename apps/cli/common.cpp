@@ -8,6 +8,7 @@
 #include <spdlog/spdlog.h>
 
 #include <revisit/config/parameter_file.hpp>
+#include <revisit/io/bag_topics.hpp>
 #include <revisit/io/calibration_file.hpp>
 #include <revisit/simulation/simulated_recording.hpp>
 
@@ -77,10 +78,50 @@ Result<Parameters> ParameterFlags::resolve() const {
   return parameters;
 }
 
-Result<std::unique_ptr<Recording>> open_input(const std::string& input, const std::string& poses_file,
+void InputFlags::add_to(CLI::App& command) {
+  const std::string group = "Bags and packet captures";
+  command.add_option("--topic", options_.topic, "Topic of the scans or packets, where there are several")->group(group);
+  command
+      .add_option("--odometry-topic", options_.odometry_topic,
+                  "Topic of wheel or other odometry, where there are several; none: without")
+      ->group(group);
+  command.add_flag("--no-imu", without_imu_, "Leave an IMU out")->group(group);
+  command
+      .add_option("--sensor", sensor_file_,
+                  "JSON that describes the Ouster sensor, where neither the bag nor a file beside it does")
+      ->group(group);
+  command.add_flag("--last-return", options_.last_return, "Of dual returns, take the last instead of the strongest")
+      ->group(group);
+}
+
+RecordingOptions InputFlags::options(const std::string& poses_file) const {
+  RecordingOptions options = options_;
+  options.poses_file = poses_file;
+  options.sensor_file = sensor_file_;
+  options.use_imu = !without_imu_;
+  return options;
+}
+
+std::string InputFlags::text() const {
+  std::string text;
+  if (!options_.topic.empty()) text += " topic=" + options_.topic;
+  if (!options_.odometry_topic.empty()) text += " odometry_topic=" + options_.odometry_topic;
+  if (without_imu_) text += " no_imu";
+  if (options_.last_return) text += " last_return";
+  return text;
+}
+
+bool is_recording(const std::string& input) {
+  std::error_code failure;
+  return std::filesystem::is_directory(input, failure) || std::filesystem::path(input).extension() == ".toml" ||
+         has_topics(input);
+}
+
+Result<std::unique_ptr<Recording>> open_input(const std::string& input, const RecordingOptions& options,
                                               Parameters* parameters) {
-  if (std::filesystem::path(input).extension() != ".toml") return open_recording(input, print_log(), poses_file);
-  if (!poses_file.empty()) return Error{poses_file + ": a simulated recording has its own, exact poses"};
+  if (std::filesystem::path(input).extension() != ".toml") return open_recording(input, print_log(), options);
+  if (!options.poses_file.empty())
+    return Error{options.poses_file.string() + ": a simulated recording has its own, exact poses"};
   const auto described = read_parameter_file(input, {});
   if (!described) return described.error();
   auto recording = simulate(described->simulation, print_log());

@@ -55,9 +55,31 @@ class ParameterFlags {
   std::map<std::string, std::string> values_;
 };
 
+/// The flags that say what of a bag or a packet capture is meant.
+class InputFlags {
+ public:
+  void add_to(CLI::App& command);
+  RecordingOptions options(const std::string& poses_file = {}) const;
+  /// All of them as text: what must stay as it was when a run is continued.
+  std::string text() const;
+
+ private:
+  RecordingOptions options_;
+  std::string sensor_file_;
+  bool without_imu_ = false;
+};
+
+/// What the commands take as a recording, for their help.
+inline constexpr const char* kRecordingHelp =
+    "Recording: ROS bag (.bag, .mcap, .db3 or a folder of them), packet capture (.pcap), KITTI folder or raw drive, "
+    "folder of scans, or .toml of a simulated drive";
+
+/// Whether a path is a recording, not a single scan.
+bool is_recording(const std::string& input);
+
 /// A recording on the disk, or the one that a file of parameters (.toml) describes, simulated while it is read; its
 /// options then stand in `parameters`, if given.
-Result<std::unique_ptr<Recording>> open_input(const std::string& input, const std::string& poses_file = {},
+Result<std::unique_ptr<Recording>> open_input(const std::string& input, const RecordingOptions& options = {},
                                               Parameters* parameters = nullptr);
 
 /// What stands for the exclusion of the recent past where the recording has no times: frames alone; said once.

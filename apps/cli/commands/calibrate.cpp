@@ -14,6 +14,7 @@ namespace {
 struct CalibrateOptions {
   std::string input, out, poses;
   std::size_t scans = 100;
+  InputFlags recording;
   ParameterFlags parameters;
 };
 
@@ -24,7 +25,7 @@ int calibrate(const CalibrateOptions& options) {
   // An earlier calibration may be replaced, nothing else.
   if (std::error_code failure; std::filesystem::is_regular_file(options.out, failure) && !read_calibration(options.out))
     return fail({options.out + ": exists and is no calibration; name another file"}, kUsage);
-  const auto recording = open_input(options.input, options.poses);
+  const auto recording = open_input(options.input, options.recording.options(options.poses));
   if (!recording) return fail(recording.error());
   listen_for_interrupt();
   Result<CalibrationReport> report = Error{};
@@ -73,6 +74,7 @@ Run add_calibrate(CLI::App& program) {
       ->capture_default_str()
       ->check(CLI::Range(2, 200));
   command->add_option("--poses", options->poses, "Pose file (KITTI, TUM, g2o), instead of the recording's own poses");
+  options->recording.add_to(*command);
   options->parameters.add_to(*command, {"preprocess", "intensity", "geometric"});
   return [options] { return calibrate(*options); };
 }

@@ -26,6 +26,7 @@ struct CompareOptions {
   std::string input, out, poses;
   std::vector<std::string> methods;
   bool overwrite = false;
+  InputFlags recording;
   ParameterFlags parameters;
 };
 
@@ -151,7 +152,7 @@ Status evaluate_all(std::vector<Method>& methods, const Recording& recording, co
 int compare(const CompareOptions& options) {
   auto parameters = options.parameters.resolve();
   if (!parameters) return fail(parameters.error(), kUsage);
-  const auto recording = open_input(options.input, options.poses, &*parameters);
+  const auto recording = open_input(options.input, options.recording.options(options.poses), &*parameters);
   if (!recording) return fail(recording.error());
   if ((*recording)->trajectory().empty())
     return fail({options.input + ": has no poses to judge the methods by; name a pose file with --poses"});
@@ -206,6 +207,7 @@ Run add_compare(CLI::App& program) {
       ->check(CLI::IsMember(method_names()));
   command->add_option("--poses", options->poses, "Pose file (KITTI, TUM, g2o), instead of the recording's own poses");
   command->add_flag("--overwrite", options->overwrite, "Replace results that are already in the folder");
+  options->recording.add_to(*command);
   options->parameters.add_to(*command);
   return [options] { return compare(*options); };
 }

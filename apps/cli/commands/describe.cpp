@@ -15,19 +15,15 @@ namespace {
 struct DescribeOptions {
   std::string scan, picture, calibration;
   std::optional<std::int64_t> frame;
+  InputFlags recording;
   ParameterFlags parameters;
 };
-
-bool is_recording(const std::string& input) {
-  std::error_code failure;
-  return std::filesystem::is_directory(input, failure) || std::filesystem::path(input).extension() == ".toml";
-}
 
 // The scan in the file, or the one of that frame in the recording.
 Result<Scan> read_input(const DescribeOptions& options) {
   if (!is_recording(options.scan)) return read_scan(options.scan, print_log());
   if (!options.frame) return Error{options.scan + ": is a recording; name a scan of it with --frame"};
-  const auto recording = open_input(options.scan);
+  const auto recording = open_input(options.scan, options.recording.options());
   if (!recording) return recording.error();
   for (std::size_t i = 0; i < (*recording)->size(); ++i)
     if ((*recording)->frame(i).value == *options.frame) return (*recording)->read(i);
@@ -76,6 +72,7 @@ Run add_describe(CLI::App& program) {
   command->add_option("--frame", options->frame, "Which scan of the recording");
   command->add_option("--out", options->picture, "The picture to write, .png")->required();
   command->add_option("--calibration", options->calibration, "Intensity calibration made by `revisit calibrate`");
+  options->recording.add_to(*command);
   options->parameters.add_to(*command, {"preprocess", "intensity", "descriptor"});
   return [options] { return describe(*options); };
 }

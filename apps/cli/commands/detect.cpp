@@ -25,6 +25,7 @@ namespace {
 struct DetectOptions {
   std::string input, out, database, calibration, poses;
   bool overwrite = false, evidence = false;
+  InputFlags recording;
   ParameterFlags parameters;
 };
 
@@ -177,7 +178,7 @@ int detect(const DetectOptions& options) {
   if (!parameters) return fail(parameters.error(), kUsage);
   const auto calibration = load_calibration(options.calibration);
   if (!calibration) return fail(calibration.error());
-  const auto recording = open_input(options.input, options.poses, &*parameters);
+  const auto recording = open_input(options.input, options.recording.options(options.poses), &*parameters);
   if (!recording) return fail(recording.error());
   use_frames_alone_without_times(**recording, *parameters);
   auto database = open_database(options.database, *parameters);
@@ -194,6 +195,7 @@ int detect(const DetectOptions& options) {
   run.database = absolute(options.database);
   run.poses = absolute(options.poses);
   run.calibration = absolute(options.calibration);
+  run.topic = options.recording.options().topic;
   run.parameters = *parameters;
   const Recording& scale_source = database->recording ? *database->recording : **recording;
   const auto scale = intensity_scale_of(scale_source, parameters->intensity);
@@ -256,10 +258,7 @@ Run add_detect(CLI::App& program) {
       "  poses.txt/.tum  the poses that came with the recording, if any, and the calib.txt that poses.txt needs\n"
       "  run.json        version, parameters, counts, milliseconds a stage\n\n"
       "Example: revisit detect kitti/sequences/00 --out results/00");
-  command
-      ->add_option("input", options->input,
-                   "Recording: KITTI folder, KITTI raw drive, folder of scans, or .toml of a simulated drive")
-      ->required();
+  command->add_option("input", options->input, kRecordingHelp)->required();
   command->add_option("--out", options->out, "Folder for the results")->required();
   command->add_option(
       "--database", options->database,
@@ -270,6 +269,7 @@ Run add_detect(CLI::App& program) {
   command->add_flag("--overwrite", options->overwrite, "Replace results that are already in the folder");
   command->add_flag("--evidence", options->evidence,
                     "Write evidence.csv too: the measures of every candidate that was registered");
+  options->recording.add_to(*command);
   options->parameters.add_to(*command);
   return [options] { return detect(*options); };
 }

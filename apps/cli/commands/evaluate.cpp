@@ -141,7 +141,7 @@ int evaluate(const EvaluateOptions& options) {
   const std::string recording_folder = !options.recording.empty() ? options.recording : facts.input;
   std::unique_ptr<Recording> recording;
   if (!options.recording.empty() || fs::exists(recording_folder, failure)) {
-    auto opened = open_input(recording_folder);
+    auto opened = open_input(recording_folder, {.topic = facts.topic});
     if (!opened) return fail(opened.error());
     recording = *std::move(opened);
   } else {

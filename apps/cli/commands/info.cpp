@@ -3,6 +3,8 @@
 #include <memory>
 #include <vector>
 
+#include <revisit/core/text.hpp>
+#include <revisit/io/bag_topics.hpp>
 #include <revisit/io/scan_file.hpp>
 #include <revisit/pipeline/prepare.hpp>
 #include <revisit/pipeline/recording_scale.hpp>
@@ -17,6 +19,7 @@ namespace {
 
 struct InfoOptions {
   std::string input, beside, picture;
+  InputFlags recording;
   ParameterFlags parameters;
 };
 
@@ -74,9 +77,33 @@ int compare(const Recording& recording, const InfoOptions& options, const Parame
   return kDone;
 }
 
+// The topics of a bag, or the senders of a capture, and what revisit takes them for.
+Status print_topics(const std::string& input, const RecordingOptions& options) {
+  const auto topics = list_topics(input, options);
+  if (!topics) return topics.error();
+  std::size_t longest_name = 5, longest_type = 4;
+  for (const TopicSummary& topic : *topics) {
+    longest_name = std::max(longest_name, topic.name.size());
+    longest_type = std::max(longest_type, topic.type.size());
+  }
+  const auto row = [&](const std::string& name, const std::string& type, const std::string& count,
+                       const std::string& rate, const std::string& use) {
+    std::printf("%-*s  %-*s  %8s  %8s  %s\n", static_cast<int>(longest_name), name.c_str(),
+                static_cast<int>(longest_type), type.c_str(), count.c_str(), rate.c_str(), use.c_str());
+  };
+  row("topic", "type", "messages", "Hz", "used for");
+  for (const TopicSummary& topic : *topics)
+    row(topic.name, topic.type, std::to_string(topic.messages),
+        topic.rate_hz > 0.0 ? format("%.1f", topic.rate_hz) : "", topic.use.empty() ? "-" : topic.use);
+  std::printf("\n");
+  return ok();
+}
+
 int info_of_recording(const InfoOptions& options, const Parameters& parameters) {
   const std::string& folder = options.input;
-  const auto opened = open_input(folder);
+  if (has_topics(folder))
+    if (const Status status = print_topics(folder, options.recording.options()); !status) return fail(status.error());
+  const auto opened = open_input(folder, options.recording.options());
   if (!opened) return fail(opened.error());
   const Recording& recording = **opened;
   const std::size_t last = recording.size() - 1;
@@ -90,6 +117,12 @@ int info_of_recording(const InfoOptions& options, const Parameters& parameters) 
   else if (span_s > 0.0)
     std::printf("rate         %.2f Hz, %.1f s long\n", frames / span_s, span_s);
   std::printf("poses        %zu\n", recording.trajectory().entries.size());
+  for (const std::string& finding : recording.findings()) {
+    const auto colon = finding.find(": ");
+    const bool has_head = colon != std::string::npos && colon < 12;
+    std::printf("%-12s %s\n", has_head ? finding.substr(0, colon).c_str() : "",
+                finding.substr(has_head ? colon + 2 : 0).c_str());
+  }
 
   std::size_t broken = 0;
   std::optional<Scan> first;
@@ -119,22 +152,23 @@ Run add_info(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
       "info", "Tell what a recording or a single scan file holds: sensor, rings, rate, intensity, poses.");
   command->footer(
-      "Example: revisit info kitti/sequences/00; revisit info cloud.pcd\n"
+      "Of a bag: its topics, how often messages come, and what each is used for.\n\n"
+      "Example: revisit info drive.bag; revisit info kitti/sequences/00; revisit info cloud.pcd\n"
       "         revisit info drive --beside kitti/sequences/00 --picture statistics.png");
   command->add_option("input", options->input, "Recording or scan file")->required();
   command->add_option("--picture", options->picture, "Draw how the scans look on average into this .png");
   command->add_option("--beside", options->beside, "Another recording to compare with");
+  options->recording.add_to(*command);
   options->parameters.add_to(*command, {"preprocess", "intensity", "descriptor"});
   return [options]() -> int {
     const auto parameters = options->parameters.resolve();
     if (!parameters) return fail(parameters.error(), kUsage);
     if (!options->picture.empty())
       if (const Status status = check_output(options->picture, ".png"); !status) return fail(status.error(), kUsage);
-    const bool is_recording =
-        std::filesystem::is_directory(options->input) || std::filesystem::path(options->input).extension() == ".toml";
-    if (!is_recording && !(options->picture.empty() && options->beside.empty()))
+    const bool is_one = !is_recording(options->input);
+    if (is_one && !(options->picture.empty() && options->beside.empty()))
       return fail({options->input + ": --picture and --beside need a recording, not a single scan"}, kUsage);
-    return is_recording ? info_of_recording(*options, *parameters) : info_of_file(options->input, *parameters);
+    return is_one ? info_of_file(options->input, *parameters) : info_of_recording(*options, *parameters);
   };
 }
 

@@ -25,23 +25,26 @@ struct SlamOptions {
   std::string input, out, poses, calibration, odometry, wheels;
   double sweep_s = 0.0;
   bool overwrite = false, resume = false, without_map = false;
+  InputFlags recording;
   ParameterFlags parameters;
 };
 
-// The poses that stand in for, or help, the tracking of scans; empty where there are none.
-Result<Trajectory> other_odometry(const SlamOptions& options, const Recording& recording) {
+// The pose that stands in for, or helps, the tracking of scan `index`, if there is one.
+using OtherOdometry = std::function<std::optional<Pose>(std::size_t index)>;
+
+Result<OtherOdometry> other_odometry(const SlamOptions& options, const Recording& recording) {
   const std::string& file = options.odometry.empty() ? options.wheels : options.odometry;
-  if (file == "none") return Trajectory();
-  if (file.empty()) return recording.wheel_odometry();
-  if (file == "wheels") {
-    if (recording.wheel_odometry().empty()) return Error{options.input + ": has no wheel odometry"};
-    return recording.wheel_odometry();
-  }
+  if (file == "none") return OtherOdometry([](std::size_t) { return std::nullopt; });
+  if (file == "wheels" && !recording.has_wheel_odometry()) return Error{options.input + ": has no wheel odometry"};
+  if (file.empty() || file == "wheels")
+    return OtherOdometry([&recording](std::size_t index) { return recording.wheel_pose(index); });
   const auto poses = read_poses(file);
   if (!poses) return poses.error();
   auto trajectory = to_trajectory(*poses, recording.T_camera_lidar(), stamps_of(recording));
   if (trajectory.empty()) return Error{file + ": no pose belongs to a frame of the recording"};
-  return trajectory;
+  return OtherOdometry([&recording, poses_of = std::move(trajectory)](std::size_t index) {
+    return poses_of.at(recording.frame(index));
+  });
 }
 
 // A map is not continued with another recording.
@@ -57,7 +60,8 @@ Status check_note(MapStore& store, const std::string& name, const std::string& v
 // What must stay as it was when the map was begun.
 std::string parameters_text(const Parameters& parameters, const SlamOptions& options) {
   std::string text = "odometry=" + options.odometry + " wheels=" + options.wheels +
-                     " calibration=" + options.calibration + " sweep=" + std::to_string(options.sweep_s);
+                     " calibration=" + options.calibration + " sweep=" + std::to_string(options.sweep_s) +
+                     options.recording.text();
   for (const ParameterInfo& info : parameter_infos())
     if (info.name.starts_with("preprocess.") || info.name.starts_with("intensity.") ||
         info.name.starts_with("descriptor."))
@@ -97,13 +101,13 @@ void count(RunFile& run, const SlamStep& step) {
     run.ms_total[stage] += value;
 }
 
-Status run_all(Slam& slam, const Recording& recording, const Trajectory& odometry, double sweep_s, RunFile& run) {
+Status run_all(Slam& slam, const Recording& recording, const OtherOdometry& odometry, double sweep_s, RunFile& run) {
   std::size_t first = 0;
   if (const auto last = slam.last_frame()) {
     while (first < recording.size() && recording.frame(first) <= *last) ++first;
     print_log()(LogLevel::kInfo, "going on after frame " + std::to_string(last->value) + ": " +
                                      std::to_string(slam.graph().keyframes().size()) + " key frames are there");
-    if (const auto T_odom_lidar = odometry.at(*last)) slam.restore_external(*T_odom_lidar);
+    if (const auto T_odom_lidar = first > 0 ? odometry(first - 1) : std::nullopt) slam.restore_external(*T_odom_lidar);
   }
   Progress progress("slam", "scans", recording.size() - first);
   ReadAhead scans(recording, first);
@@ -112,8 +116,7 @@ Status run_all(Slam& slam, const Recording& recording, const Trajectory& odometr
     auto scan = scans.next();
     run.ms_total["read"] += watch.lap_ms();
     if (scan) assume_sweep(*scan, sweep_s);
-    const auto step =
-        scan ? slam.process(*std::move(scan), odometry.at(recording.frame(i))) : Result<SlamStep>(scan.error());
+    const auto step = scan ? slam.process(*std::move(scan), odometry(i)) : Result<SlamStep>(scan.error());
     if (step) {
       count(run, *step);
     } else if (slam.has_failed()) {
@@ -192,7 +195,7 @@ int slam(const SlamOptions& options) {
                 kUsage);
   const auto calibration = load_calibration(options.calibration);
   if (!calibration) return fail(calibration.error());
-  const auto recording = open_input(options.input, options.poses, &*parameters);
+  const auto recording = open_input(options.input, options.recording.options(options.poses), &*parameters);
   if (!recording) return fail(recording.error());
   use_frames_alone_without_times(**recording, *parameters);
   const auto odometry = other_odometry(options, **recording);
@@ -207,6 +210,7 @@ int slam(const SlamOptions& options) {
   run.input = fs::absolute(options.input).lexically_normal().string();
   run.poses = options.odometry.empty() ? options.wheels : options.odometry;
   run.calibration = options.calibration;
+  run.topic = options.recording.options().topic;
   run.parameters = *parameters;
   run.intensity = *scale;
 
@@ -275,7 +279,7 @@ Run add_slam(CLI::App& program) {
   command->add_option(
       "--wheels", options->wheels,
       "Pose file (TUM, KITTI, g2o) of wheel odometry, in the LiDAR's frame, that helps where scans fail "
-      "(default: the recording's wheel_odometry.tum, if any; none: without)");
+      "(default: the recording's own, if any: wheel_odometry.tum, a bag's odometry; none: without)");
   command->add_option("--odometry", options->odometry,
                       "Pose file of another odometry, taken instead of tracking the scans (wheels: the recording's)");
   command
@@ -291,6 +295,7 @@ Run add_slam(CLI::App& program) {
   command->add_flag("--resume", options->resume, "Continue the map that is in the folder");
   command->add_flag("--overwrite", options->overwrite, "Replace the map that is in the folder");
   command->add_flag("--no-map", options->without_map, "Write the trajectory only");
+  options->recording.add_to(*command);
   options->parameters.add_to(*command);
   return [options] { return slam(*options); };
 }

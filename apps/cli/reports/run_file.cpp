@@ -10,12 +10,17 @@
 namespace revisit::cli {
 
 Status write_run(const std::filesystem::path& file, const RunFile& run) {
-  nlohmann::ordered_json document = {
-      {"program", "revisit"},           {"version", REVISIT_VERSION},
-      {"command", run.command},         {"input", run.input},
-      {"database", run.database},       {"poses", run.poses},
-      {"calibration", run.calibration}, {"arguments", run.arguments},
-      {"interrupted", run.interrupted}, {"parameters", nlohmann::ordered_json::object()}};
+  nlohmann::ordered_json document = {{"program", "revisit"},
+                                     {"version", REVISIT_VERSION},
+                                     {"command", run.command},
+                                     {"input", run.input},
+                                     {"topic", run.topic},
+                                     {"database", run.database},
+                                     {"poses", run.poses},
+                                     {"calibration", run.calibration},
+                                     {"arguments", run.arguments},
+                                     {"interrupted", run.interrupted},
+                                     {"parameters", nlohmann::ordered_json::object()}};
   const bool is_simulated = std::filesystem::path(run.input).extension() == ".toml";
   for (const ParameterInfo& info : parameter_infos()) {
     const std::string value = get_parameter(run.parameters, info.name);
@@ -46,6 +51,7 @@ Result<RunFacts> read_run(const std::filesystem::path& file) {
   RunFacts facts;
   try {
     facts.input = document.value("input", "");
+    facts.topic = document.value("topic", "");
     facts.database = document.value("database", "");
     facts.interrupted = document.value("interrupted", false);
     const auto parameters = document.value("parameters", nlohmann::json::object());

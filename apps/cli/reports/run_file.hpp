@@ -15,7 +15,7 @@ namespace revisit::cli {
 
 /// run.json: what was run, on what, and what it cost.
 struct RunFile {
-  std::string command, input, database, poses, calibration;
+  std::string command, input, topic, database, poses, calibration;
   std::vector<std::string> arguments;  ///< as given to the program
   Parameters parameters;
   IntensityScale intensity;
@@ -30,7 +30,7 @@ Status write_run(const std::filesystem::path& file, const RunFile& run);
 
 /// What `evaluate` needs of a run; absent entries where the file does not have them.
 struct RunFacts {
-  std::string input, database;
+  std::string input, topic, database;
   bool interrupted = false;
   std::optional<int> exclude_frames;
   std::optional<double> exclude_s;

@@ -3,11 +3,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include <revisit/core/ids.hpp>
+#include <revisit/core/imu.hpp>
 
 namespace revisit {
 
@@ -30,6 +32,9 @@ struct Scan {
   std::vector<float> times_s;          ///< time of each point from `stamp_s`, seconds; may be negative
   std::size_t dropped_non_finite = 0;  ///< points left out by the reader: NaN or infinite
   std::size_t dropped_at_origin = 0;   ///< points left out by the reader: exactly (0,0,0), "no return"
+  std::vector<ImuSample> imu;          ///< from before the sweep to its end, increasing times; may be empty
+  /// Which way is up, a unit vector in the frame of the points, where something knows it (a mounting, gravity).
+  std::optional<Eigen::Vector3f> up;
 };
 
 /// Throws std::invalid_argument unless `rings` and `times_s` are empty or hold one entry a point.

@@ -31,10 +31,10 @@ struct TrajectoryPoint {
             off_m};
   }
   /// The first point of the next segment, where tracking failed in between: off by so many metres at most.
-  TrajectoryPoint after_gap(const Pose& T_here_next, double off_m) const {
+  TrajectoryPoint after_gap(const Pose& T_here_next, double gap_m) const {
     TrajectoryPoint next = after(T_here_next);
     ++next.segment;
-    next.off_m += off_m;
+    next.off_m += gap_m;
     return next;
   }
   /// The same as after(), where the pose of the next one is known.

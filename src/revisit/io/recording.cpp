@@ -4,10 +4,11 @@
 #include <algorithm>
 #include <charconv>
 #include <iomanip>
-#include <mutex>
-#include <set>
 
+#include <revisit/io/internal/bag.hpp>
+#include <revisit/io/internal/bag_recording.hpp>
 #include <revisit/io/internal/kitti_folder.hpp>
+#include <revisit/io/internal/remarks.hpp>
 #include <revisit/io/internal/text_writer.hpp>
 #include <revisit/io/pose_file.hpp>
 #include <revisit/io/scan_file.hpp>
@@ -23,27 +24,6 @@ struct ScanFile {
   double stamp_s = 0.0;
 };
 
-// Remarks about single files, each kind of them once: the first file speaks for the others.
-class Remarks {
- public:
-  void set_log(LogSink log) { log_ = std::move(log); }
-  const LogSink& log() const { return log_; }
-  /// A sink for what is said about this file. Safe to call from several threads.
-  LogSink about(const fs::path& file) const {
-    return [this, file](LogLevel level, const std::string& message) {
-      const std::string prefix = file.string() + ": ";
-      const std::string remark = message.starts_with(prefix) ? message.substr(prefix.size()) : message;
-      const std::scoped_lock lock(mutex_);
-      if (said_.insert(remark).second) log_to(log_, level, prefix + remark + " (said once for the recording)");
-    };
-  }
-
- private:
-  LogSink log_;
-  mutable std::mutex mutex_;
-  mutable std::set<std::string> said_;
-};
-
 class FolderRecording final : public Recording {
  public:
   std::string kind_;
@@ -52,7 +32,7 @@ class FolderRecording final : public Recording {
   Trajectory trajectory_, wheel_odometry_;
   std::optional<Pose> T_camera_lidar_;
   fs::path point_values_;  // where times and rings of points may stand
-  Remarks remarks_;
+  std::shared_ptr<io_internal::Remarks> remarks_;
 
   std::size_t size() const override { return scans_.size(); }
   FrameId frame(std::size_t index) const override { return scans_.at(index).frame; }
@@ -60,12 +40,13 @@ class FolderRecording final : public Recording {
   std::string kind() const override { return kind_; }
   bool has_times() const override { return has_times_; }
   const Trajectory& trajectory() const override { return trajectory_; }
-  const Trajectory& wheel_odometry() const override { return wheel_odometry_; }
+  bool has_wheel_odometry() const override { return !wheel_odometry_.empty(); }
+  std::optional<Pose> wheel_pose(std::size_t index) const override { return wheel_odometry_.at(frame(index)); }
   std::optional<Pose> T_camera_lidar() const override { return T_camera_lidar_; }
 
   Result<Scan> read(std::size_t index) const override {
     const fs::path& file = scans_.at(index).file;
-    auto scan = read_scan(file, remarks_.about(file));
+    auto scan = read_scan(file, remarks_->about(file));
     if (!scan) return scan;
     if (!point_values_.empty())
       if (const Status status = io_internal::read_point_values(point_values_, scans_[index].file.filename(), *scan);
@@ -145,7 +126,7 @@ Status list_scans(const fs::path& folder, FolderRecording& recording) {
   for (fs::directory_iterator it(folder, failure), end; !failure && it != end; it.increment(failure))
     if (has_scan_extension(it->path())) files.push_back(it->path());
   if (failure) return Error{folder.string() + ": cannot be read: " + failure.message()};
-  if (files.empty()) return Error{folder.string() + ": holds no scan (.bin, .pcd, .ply)"};
+  if (files.empty()) return Error{folder.string() + ": holds no scan (.bin, .pcd, .ply, .las)"};
   std::sort(files.begin(), files.end());
   std::map<FrameId, fs::path> by_number;
   for (const fs::path& file : files)
@@ -218,7 +199,7 @@ Status find_side_files(FolderRecording& recording, const fs::path& folder) {
   const fs::path beside = fs::absolute(folder / "..").lexically_normal();
   const Status status = add_side_files(recording, beside);
   if (!status)
-    log_to(recording.remarks_.log(), LogLevel::kWarning, status.error().message + "; what stands beside is left out");
+    log_to(recording.remarks_->log(), LogLevel::kWarning, status.error().message + "; what stands beside is left out");
   return ok();
 }
 
@@ -243,7 +224,7 @@ Status add_kitti_raw(FolderRecording& recording, const fs::path& folder) {
     if (!calibration) return calibration.error();
     T_lidar_imu = *calibration;
   } else {
-    log_to(recording.remarks_.log(), LogLevel::kWarning,
+    log_to(recording.remarks_->log(), LogLevel::kWarning,
            beside.string() + ": missing, and the IMU's poses are not the LiDAR's: they are left out");
     return ok();
   }
@@ -257,20 +238,22 @@ Status add_kitti_raw(FolderRecording& recording, const fs::path& folder) {
   return ok();
 }
 
-}  // namespace
-
-Result<std::unique_ptr<Recording>> open_recording(const fs::path& folder, const LogSink& log,
-                                                  const fs::path& poses_file) {
+bool is_folder_of_scans(const fs::path& folder) {
   std::error_code failure;
-  const fs::file_status status = fs::status(folder, failure);
-  if (status.type() == fs::file_type::not_found) return Error{folder.string() + ": no such file or folder"};
-  if (failure) return Error{folder.string() + ": cannot be read: " + failure.message()};
-  if (!fs::is_directory(status)) return Error{folder.string() + ": is not a folder of scans"};
+  if (fs::is_directory(folder / "velodyne_points" / "data", failure) || fs::is_directory(folder / "velodyne", failure))
+    return true;
+  for (fs::directory_iterator it(folder, failure), end; !failure && it != end; it.increment(failure))
+    if (has_scan_extension(it->path())) return true;
+  return false;
+}
 
+Result<std::unique_ptr<Recording>> open_folder(const fs::path& folder, const LogSink& log,
+                                               const RecordingOptions& options) {
+  std::error_code failure;
   const fs::path raw = folder / "velodyne_points" / "data", odometry = folder / "velodyne";
   const bool is_raw = fs::is_directory(raw, failure), is_odometry = fs::is_directory(odometry, failure);
   auto recording = std::make_unique<FolderRecording>();
-  recording->remarks_.set_log(log);
+  recording->remarks_ = std::make_shared<io_internal::Remarks>(log);
   recording->kind_ = "folder of scans";
   if (const Status listed = list_scans(is_raw ? raw : is_odometry ? odometry : folder, *recording); !listed)
     return listed.error();
@@ -284,14 +267,29 @@ Result<std::unique_ptr<Recording>> open_recording(const fs::path& folder, const 
     if (!poses) return poses.error();
     recording->wheel_odometry_ = recording->of_scans(*poses);
   }
-  if (!poses_file.empty()) {
-    const auto poses = read_poses(poses_file);
-    if (!poses) return poses.error();
-    recording->trajectory_ = recording->of_scans(*poses);
-    if (recording->trajectory_.empty())
-      return Error{poses_file.string() + ": no pose belongs to a frame of " + folder.string()};
+  if (!options.poses_file.empty()) {
+    auto trajectory = io_internal::read_trajectory(options.poses_file, *recording);
+    if (!trajectory) return trajectory.error();
+    recording->trajectory_ = *std::move(trajectory);
   }
   return std::unique_ptr<Recording>(std::move(recording));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Recording>> open_recording(const fs::path& path, const LogSink& log,
+                                                  const RecordingOptions& options) {
+  std::error_code failure;
+  const fs::file_status status = fs::status(path, failure);
+  if (status.type() == fs::file_type::not_found) return Error{path.string() + ": no such file or folder"};
+  if (failure) return Error{path.string() + ": cannot be read: " + failure.message()};
+  if (io_internal::is_capture(path)) return io_internal::open_capture_recording(path, options, log);
+  if (!is_folder_of_scans(path) && io_internal::Bag::is_bag(path))
+    return io_internal::open_bag_recording(path, options, log);
+  if (!fs::is_directory(status))
+    return Error{path.string() + ": is no recording: neither a folder of scans nor a bag (.bag, .mcap, .db3) nor a " +
+                 "packet capture (.pcap)"};
+  return open_folder(path, log, options);
 }
 
 Result<Pose> read_camera_calibration(const fs::path& file) { return io_internal::read_kitti_calibration(file, "Tr"); }

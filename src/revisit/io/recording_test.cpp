@@ -122,12 +122,13 @@ TEST(Recording, PosesMayComeFromAFileOfTheirOwn) {
   write_bin(folder / "4.bin", 2.f);
   const fs::path poses = folder / "poses.g2o";
   std::ofstream(poses) << "VERTEX_SE3:QUAT 4 1 2 3 0 0 0 1\nVERTEX_SE3:QUAT 99 0 0 0 0 0 0 1\n";
-  const auto recording = open_recording(folder, {}, poses);
+  const auto recording = open_recording(folder, {}, {.poses_file = poses});
   ASSERT_TRUE(recording) << recording.error().message;
   EXPECT_EQ((*recording)->trajectory().entries.size(), 1u) << "frame 99 is not in the recording";
   EXPECT_DOUBLE_EQ((*recording)->trajectory().at(FrameId{4})->translation().y(), 2.0);
   std::ofstream(poses) << "VERTEX_SE3:QUAT 99 0 0 0 0 0 0 1\n";
-  EXPECT_NE(open_recording(folder, {}, poses).error().message.find("no pose belongs"), std::string::npos);
+  EXPECT_NE(open_recording(folder, {}, {.poses_file = poses}).error().message.find("no pose belongs"),
+            std::string::npos);
 }
 
 TEST(Recording, KittiRawTimesAndCalibration) {
@@ -173,7 +174,7 @@ TEST(Recording, FoldersThatCannotServeAreNamed) {
   const fs::path folder = fresh_folder();
   EXPECT_NE(open_recording(folder).error().message.find("holds no scan"), std::string::npos);
   write_bin(folder / "0.bin", 1.f);
-  EXPECT_NE(open_recording(folder / "0.bin").error().message.find("not a folder"), std::string::npos);
+  EXPECT_NE(open_recording(folder / "0.bin").error().message.find("is no recording"), std::string::npos);
 }
 
 TEST(Recording, BrokenSideFilesOfAKittiFolderAreErrors) {

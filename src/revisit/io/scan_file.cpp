@@ -26,11 +26,13 @@ Result<Scan> read_any(const std::filesystem::path& file, const LogSink& log) {
   if (extension == ".bin") return io_internal::read_bin(file);
   if (extension == ".pcd") return io_internal::read_pcd(file, log);
   if (extension == ".ply") return io_internal::read_ply(file, log);
-  if (extension == ".pcap")
-    return Error{file.string() + ": captured packets (pcap) are not supported yet; convert them to .pcd first"};
-  if (extension == ".bag" || extension == ".mcap" || extension == ".db3")
-    return Error{file.string() + ": ROS bags are not supported yet; convert the scans to .pcd first"};
-  return Error{file.string() + ": unknown kind of file '" + extension + "'; allowed: .bin, .pcd, .ply"};
+  if (extension == ".las") return io_internal::read_las(file, log);
+  if (extension == ".laz")
+    return Error{file.string() +
+                 ": compressed LAS is not read; `laszip -i FILE -o FILE.las` or `pdal translate` unpacks it"};
+  if (extension == ".e57")
+    return Error{file.string() + ": E57 is not read; `pdal translate FILE.e57 FILE.las` or CloudCompare converts it"};
+  return Error{file.string() + ": unknown kind of scan '" + extension + "'; allowed: .bin, .pcd, .ply, .las"};
 }
 
 }  // namespace
@@ -55,7 +57,7 @@ bool append_point(Scan& scan, const Point& point) {
 
 bool has_scan_extension(const std::filesystem::path& file) {
   const std::string extension = lower_extension(file);
-  return extension == ".bin" || extension == ".pcd" || extension == ".ply";
+  return extension == ".bin" || extension == ".pcd" || extension == ".ply" || extension == ".las";
 }
 
 Result<Scan> read_scan(const std::filesystem::path& file, const LogSink& log) {

@@ -134,11 +134,41 @@ TEST(ReadBin, NothingUsableIsAnError) {
 }
 
 TEST(ReadScan, KindsThatAreNotReadSayWhatToDo) {
-  EXPECT_NE(read_scan(write_file("a.pcap", "x")).error().message.find("not supported yet"), std::string::npos);
-  EXPECT_NE(read_scan(write_file("a.bag", "x")).error().message.find("not supported yet"), std::string::npos);
+  EXPECT_NE(read_scan(write_file("a.laz", "x")).error().message.find("laszip"), std::string::npos);
+  EXPECT_NE(read_scan(write_file("a.e57", "x")).error().message.find("pdal translate"), std::string::npos);
   EXPECT_NE(read_scan(write_file("a.txt", "x")).error().message.find("allowed: .bin, .pcd, .ply"), std::string::npos);
   for (const char* missing : {"/no/such.bin", "/no/such", "nowhere.txt"})
     EXPECT_EQ(read_scan(missing).error().message, missing + std::string(": no such file or folder"));
+}
+
+TEST(ReadScan, SurveyFormatsAreReadOrRefusedByName) {
+  REVISIT_NEEDS_SHARED_DATA();
+  const auto survey = shared_data() / "recordings" / "survey";
+  std::string remark;
+  const auto scan = read_scan(survey / "simple.las", [&](LogLevel, const std::string& message) { remark = message; });
+  ASSERT_TRUE(scan) << scan.error().message;
+  EXPECT_EQ(scan->points.size(), 1065u);
+  EXPECT_LT(std::abs(scan->points[0].x), 1.f) << "counted from the first point";
+  EXPECT_NE(remark.find("(637012, 849028, 431)"), std::string::npos) << remark;
+  for (const auto& [file, advice] :
+       {std::pair{"simple.laz", "laszip"}, {"color.copc.laz", "laszip"}, {"A_B.e57", "pdal translate"}})
+    EXPECT_NE(read_scan(survey / file).error().message.find(advice), std::string::npos) << file;
+}
+
+TEST(ReadScan, LasThatLiesIsRefused) {
+  REVISIT_NEEDS_SHARED_DATA();
+  std::ifstream stream(shared_data() / "recordings" / "survey" / "simple.las", std::ios::binary);
+  const std::string whole{std::istreambuf_iterator<char>(stream), {}};
+  EXPECT_TRUE(read_scan(write_file("whole.las", whole)));
+  for (const auto& [at, value] :
+       {std::pair{std::size_t{104}, '\x83'}, {104, '\x0b'}, {105, '\x01'}, {110, '\x7f'}, {138, '\xbf'}, {0, 'X'}}) {
+    std::string broken = whole;
+    broken[at] = value;
+    const auto scan = read_scan(write_file("broken.las", broken));
+    ASSERT_FALSE(scan) << at;
+    EXPECT_NE(scan.error().message.find("LAS header"), std::string::npos) << scan.error().message;
+  }
+  EXPECT_FALSE(read_scan(write_file("cut.las", whole.substr(0, whole.size() / 2))));
 }
 
 std::string pcd(const std::string& fields, const std::string& sizes, const std::string& types,

@@ -171,13 +171,13 @@ Result<MapReport> build_map(const MapInput& input, const MapOptions& options, co
   TileFiles files(tiles, options.tile_m);
   Status written = ok();
   bool is_stopped = false;
-  const Status status =
+  const Status visited =
       for_each_keyframe(input, options, report.moving, [&](const std::vector<Point>& placed, std::size_t done) {
         written = files.add(placed);
         is_stopped = progress && !progress(done);
         return written && !is_stopped ? Next::kGoOn : Next::kStop;
       });
-  if (!status) return status.error();
+  if (!visited) return visited.error();
   if (!written) return written.error();
   if (is_stopped) {
     fs::remove_all(tiles, failure);

@@ -30,7 +30,9 @@ class SimulatedRecording final : public Recording {
   const SimulationOptions& options() const;
   const SensorModel& sensor() const;
   /// Flat, from the first pose on, with slip and a wrong scale.
-  const Trajectory& wheel_odometry() const override;
+  const Trajectory& wheel_odometry() const;
+  bool has_wheel_odometry() const override { return true; }
+  std::optional<Pose> wheel_pose(std::size_t index) const override { return wheel_odometry().at(frame(index)); }
   /// Six degrees of freedom, drifting away slowly.
   const Trajectory& drifting_odometry() const;
 

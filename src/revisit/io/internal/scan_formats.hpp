@@ -19,6 +19,7 @@ namespace revisit::io_internal {
 Result<Scan> read_bin(const std::filesystem::path& file);
 Result<Scan> read_pcd(const std::filesystem::path& file, const LogSink& log);
 Result<Scan> read_ply(const std::filesystem::path& file, const LogSink& log);
+Result<Scan> read_las(const std::filesystem::path& file, const LogSink& log);
 
 /// The scan in a PCL cloud of any field layout; fields are found by the names that drivers use.
 Result<Scan> to_scan(const std::filesystem::path& file, const pcl::PCLPointCloud2& cloud, const LogSink& log);
