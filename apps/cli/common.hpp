@@ -39,6 +39,7 @@ Run add_calibrate(CLI::App& program);
 Run add_info(CLI::App& program);
 Run add_parameters(CLI::App& program);
 Run add_simulate(CLI::App& program);
+Run add_convert(CLI::App& program);
 
 /// The flags that choose parameters: --preset, --parameters FILE, and one flag a parameter, in this order of strength.
 class ParameterFlags {

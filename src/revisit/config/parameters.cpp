@@ -89,6 +89,8 @@ const std::vector<Entry>& table() {
       REVISIT_REAL(simulation, tilt_deg, 0, 40, "how far a sensor carried by hand leans to and fro, at most"),
       REVISIT_SWITCH(simulation, motion_distortion,
                      "the sensor moves on while it sweeps; false: each scan is taken at once"),
+      REVISIT_SWITCH(simulation, imu,
+                     "the sensor has an IMU inside, with noise and bias; scans and bags then hold its readings"),
       REVISIT_REAL(simulation, traffic, 0, 5, "how many vehicles and people move about, as a multiple of the default"),
   };
   return entries;

@@ -75,6 +75,7 @@ struct SimulationOptions {
   int frames = 0;                 ///< the first so many scans; 0: all of the drive
   double tilt_deg = 0.0;          ///< how far a sensor carried by hand leans, at most
   bool motion_distortion = true;  ///< the sensor moves while it sweeps
+  bool imu = false;               ///< the sensor has an IMU inside
   double traffic = 1.0;           ///< how many move about, as a multiple of the default
 };
 

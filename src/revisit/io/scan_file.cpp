@@ -40,14 +40,7 @@ Result<Scan> read_any(const std::filesystem::path& file, const LogSink& log) {
 namespace io_internal {
 
 bool append_point(Scan& scan, const Point& point) {
-  if (!(std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z))) {
-    ++scan.dropped_non_finite;
-    return false;
-  }
-  if (point.x == 0.f && point.y == 0.f && point.z == 0.f) {
-    ++scan.dropped_at_origin;
-    return false;
-  }
+  if (!is_return(scan, point)) return false;
   scan.points.push_back(point);
   if (!std::isfinite(point.intensity)) scan.points.back().intensity = 0.f;
   return true;

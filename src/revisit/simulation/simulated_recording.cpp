@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include <revisit/simulation/internal/imu_model.hpp>
 #include <revisit/simulation/internal/odometry_model.hpp>
 #include <revisit/simulation/internal/scanner.hpp>
 
@@ -46,7 +47,14 @@ std::optional<Pose> SimulatedRecording::T_camera_lidar() const {
 
 Result<Scan> SimulatedRecording::read(std::size_t index) const {
   if (index >= size()) throw std::out_of_range("scan " + std::to_string(index) + " of " + std::to_string(size()));
-  return parts_->scanner->sweep(static_cast<std::int64_t>(index), stamp_s(index));
+  Scan scan = parts_->scanner->sweep(static_cast<std::int64_t>(index), stamp_s(index));
+  // Since the sweep before, and to the end of this one.
+  if (parts_->options.imu) scan.imu = imu(stamp_s(index), stamp_s(index) - 0.2, stamp_s(index) + 0.05);
+  return scan;
+}
+
+std::vector<ImuSample> SimulatedRecording::imu(double stamp_s, double from_s, double to_s) const {
+  return simulation_internal::imu_samples(*parts_->scanner, parts_->world.seed, stamp_s, from_s, to_s);
 }
 
 Result<std::unique_ptr<SimulatedRecording>> simulate(const SimulationOptions& options, const LogSink& log,

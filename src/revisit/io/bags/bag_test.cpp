@@ -7,6 +7,11 @@
 #include <gtest/gtest.h>
 #include <zlib.h>
 
+#include <revisit/core/text.hpp>
+#include <revisit/io/bag_writer.hpp>
+#include <revisit/io/internal/bytes.hpp>
+
+#include "run_program.hpp"
 #include "shared_data.hpp"
 
 namespace revisit::io_internal {
@@ -246,6 +251,65 @@ TEST(Bag, DataThatWereChangedAreNoticed) {
   ASSERT_FALSE(message);
   EXPECT_NE(message.error().message.find("checksum"), std::string::npos) << message.error().message;
 }
+
+#ifdef REVISIT_ROSBAG_LIST
+// Every message, as ROS's own library lists them.
+std::vector<std::string> list(const Bag& bag) {
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < bag.topics().size(); ++i)
+    for (const auto& [time_ns, checksum] : messages_of(bag, i))
+      lines.push_back(bag.topics()[i].name + " " + bag.topics()[i].type + " " + std::to_string(time_ns) + " " +
+                      format("%08lx", checksum));
+  std::sort(lines.begin(), lines.end());
+  return lines;
+}
+
+std::vector<std::string> list_by_rosbag(const fs::path& file) {
+  const auto outcome = testing_support::run_program(std::string(REVISIT_ROSBAG_LIST) + " " + file.string());
+  EXPECT_EQ(outcome.code, 0) << outcome.output;
+  std::vector<std::string> lines;
+  for (const std::string_view line : split_lines(outcome.output)) lines.emplace_back(line);
+  std::sort(lines.begin(), lines.end());
+  return lines;
+}
+
+TEST(BagAgainstRosbag, TheSameMessagesInEveryBag) {
+  REVISIT_NEEDS_SHARED_DATA();
+  for (const char* file :
+       {"ros1/example.bag", "ros1/example-lz4.bag", "ros1/example-bz2.bag", "ros1/luminar_lz4.bag",
+        "ros1/one_of_each.bag", "ros1/two_types_one_topic.bag", "ros1/velodyne_concat_downsampled.bag",
+        "generated/ros1_lz4.bag", "../formats/ouster_packets_ros1.bag"}) {
+    const auto opened = open(recordings() / file);
+    ASSERT_TRUE(opened.bag) << opened.error;
+    EXPECT_EQ(list(*opened.bag), list_by_rosbag(recordings() / file)) << file;
+  }
+}
+
+TEST(BagAgainstRosbag, ReadsWhatIsWrittenHere) {
+  const fs::path file = fresh_folder() / "drive.bag";
+  auto writer = BagWriter::create(file);
+  ASSERT_TRUE(writer) << writer.error().message;
+  ASSERT_TRUE(writer->write_static_transform("base_link", "lidar", Pose::Identity()));
+  Scan scan;
+  for (int i = 0; i < 20'000; ++i) {
+    scan.points.push_back({static_cast<float>(i), 1.f, 2.f, 3.f});
+    scan.rings.push_back(static_cast<std::uint16_t>(i % 16));
+    scan.times_s.push_back(1e-6f * static_cast<float>(i));
+  }
+  for (int i = 0; i < 10; ++i) {
+    scan.stamp_s = 0.1 * i;
+    ASSERT_TRUE(writer->write_odometry("/odom", "odom", "base_link", scan.stamp_s, Pose::Identity()));
+    ASSERT_TRUE(writer->write_imu("/imu", "lidar", scan.stamp_s, {}));
+    ASSERT_TRUE(writer->write_scan("/points", "lidar", scan));
+  }
+  ASSERT_TRUE(writer->finish());
+  const auto opened = open(file);
+  ASSERT_TRUE(opened.bag) << opened.error;
+  const auto own = list(*opened.bag);
+  EXPECT_EQ(own.size(), 31u);
+  EXPECT_EQ(own, list_by_rosbag(file));
+}
+#endif
 
 }  // namespace
 }  // namespace revisit::io_internal

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <filesystem>
 #include <string_view>
 
@@ -24,6 +25,18 @@ Result<Scan> read_las(const std::filesystem::path& file, const LogSink& log);
 /// The scan in a PCL cloud of any field layout; fields are found by the names that drivers use.
 Result<Scan> to_scan(const std::filesystem::path& file, const pcl::PCLPointCloud2& cloud, const LogSink& log);
 
+/// Whether the point is finite and not at (0,0,0); counts it in the scan where it is not.
+inline bool is_return(Scan& scan, const Point& point) {
+  if (!(std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z))) {
+    ++scan.dropped_non_finite;
+    return false;
+  }
+  if (point.x == 0.f && point.y == 0.f && point.z == 0.f) {
+    ++scan.dropped_at_origin;
+    return false;
+  }
+  return true;
+}
 /// Appends the point unless it is not finite or at (0,0,0), which are counted; says whether it did.
 bool append_point(Scan& scan, const Point& point);
 

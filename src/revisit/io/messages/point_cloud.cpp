@@ -26,30 +26,41 @@ const Field* find_field(const PointCloudView& cloud, std::initializer_list<std::
   return nullptr;
 }
 
-// Reads one field of a record, chosen once for all records.
-class FieldReader {
+// Copies one field of all records, as T, to every `stride`th place of `target`: the type is chosen once a cloud, and
+// the loop over points is as tight as it gets.
+template <typename T>
+class Column {
  public:
-  FieldReader(const Field* field, bool is_big_endian) {
-    if (field == nullptr) return;
-    offset_ = field->offset;
-    using Load = double (*)(const std::uint8_t*, bool);
-    static constexpr std::array<Load, 8> kLoads{&load<std::int8_t>,   &load<std::uint8_t>, &load<std::int16_t>,
-                                                &load<std::uint16_t>, &load<std::int32_t>, &load<std::uint32_t>,
-                                                &load<float>,         &load<double>};
-    load_ = kLoads.at(field->type - 1u);
-    is_big_endian_ = is_big_endian;
+  Column(const Field* field, bool is_big_endian) : field_(field), is_big_endian_(is_big_endian) {}
+  explicit operator bool() const { return field_ != nullptr; }
+
+  void copy(const std::uint8_t* records, std::size_t step, std::size_t count, T* target, std::size_t stride) const {
+    using Copy = void (*)(const std::uint8_t*, std::size_t, std::size_t, T*, std::size_t);
+    static constexpr std::array<Copy, 8> kCopies{
+        &copy_as<std::int8_t>,  &copy_as<std::uint8_t>,  &copy_as<std::int16_t>, &copy_as<std::uint16_t>,
+        &copy_as<std::int32_t>, &copy_as<std::uint32_t>, &copy_as<float>,        &copy_as<double>};
+    static constexpr std::array<Copy, 8> kReversed{&copy_reversed<std::int8_t>,  &copy_reversed<std::uint8_t>,
+                                                   &copy_reversed<std::int16_t>, &copy_reversed<std::uint16_t>,
+                                                   &copy_reversed<std::int32_t>, &copy_reversed<std::uint32_t>,
+                                                   &copy_reversed<float>,        &copy_reversed<double>};
+    (is_big_endian_ ? kReversed : kCopies).at(field_->type - 1u)(records + field_->offset, step, count, target, stride);
   }
-  explicit operator bool() const { return load_ != nullptr; }
-  double operator()(const std::uint8_t* record) const { return load_(record + offset_, is_big_endian_); }
 
  private:
-  template <typename T>
-  static double load(const std::uint8_t* at, bool is_big_endian) {
-    return static_cast<double>(io_internal::load_number<T>(at, is_big_endian));
+  template <typename Stored>
+  static void copy_as(const std::uint8_t* at, std::size_t step, std::size_t count, T* target, std::size_t stride) {
+    for (std::size_t i = 0; i < count; ++i, at += step, target += stride)
+      *target = static_cast<T>(io_internal::load_number<Stored>(at));
   }
-  double (*load_)(const std::uint8_t*, bool) = nullptr;
-  std::size_t offset_ = 0;
-  bool is_big_endian_ = false;
+  template <typename Stored>
+  static void copy_reversed(const std::uint8_t* at, std::size_t step, std::size_t count, T* target,
+                            std::size_t stride) {
+    for (std::size_t i = 0; i < count; ++i, at += step, target += stride)
+      *target = static_cast<T>(io_internal::load_number<Stored>(at, true));
+  }
+
+  const Field* field_;
+  bool is_big_endian_;
 };
 
 constexpr std::array<std::size_t, 8> kFieldBytes{1, 1, 2, 2, 4, 4, 4, 8};
@@ -82,33 +93,62 @@ Status check(const PointCloudView& cloud, const std::string& what) {
   return ok();
 }
 
-struct Readers {
-  FieldReader x, y, z, intensity, ring, time, time_ns;
+struct Columns {
+  Column<float> x, y, z, intensity;
+  Column<double> ring, time, time_ns;
 };
 
-void read_points(const PointCloudView& cloud, const Readers& read, Scan& scan, std::vector<double>& raw_times,
+// A row of the cloud; `values` keeps rings and times of its points, with or without return.
+struct Row {
+  std::vector<double> rings, times, times_ns;
+};
+
+void read_row(const std::uint8_t* records, std::size_t step, std::size_t count, const Columns& columns, Point* points,
+              Row& row) {
+  constexpr std::size_t kStride = sizeof(Point) / sizeof(float);
+  columns.x.copy(records, step, count, &points->x, kStride);
+  columns.y.copy(records, step, count, &points->y, kStride);
+  columns.z.copy(records, step, count, &points->z, kStride);
+  if (columns.intensity) columns.intensity.copy(records, step, count, &points->intensity, kStride);
+  if (columns.ring) columns.ring.copy(records, step, count, row.rings.data(), 1);
+  if (columns.time) columns.time.copy(records, step, count, row.times.data(), 1);
+  if (!columns.time_ns) return;
+  columns.time_ns.copy(records, step, count, row.times_ns.data(), 1);
+  for (std::size_t i = 0; i < count; ++i) row.times[i] += 1e-9 * row.times_ns[i];
+}
+
+void read_points(const PointCloudView& cloud, const Columns& columns, Scan& scan, std::vector<double>& raw_times,
                  bool& rings_are_whole) {
   const std::size_t points = cloud.width * cloud.height;
-  scan.points.reserve(points);
-  if (read.ring) scan.rings.reserve(points);
-  if (read.time) raw_times.reserve(points);
-  const std::size_t row = cloud.row_step != 0 ? cloud.row_step : cloud.width * cloud.point_step;
+  const std::size_t row_bytes = cloud.row_step != 0 ? cloud.row_step : cloud.width * cloud.point_step;
+  scan.points.resize(points);
+  if (columns.ring) scan.rings.resize(points);
+  if (columns.time) raw_times.resize(points);
+  Row row{std::vector<double>(columns.ring ? cloud.width : 0), std::vector<double>(columns.time ? cloud.width : 0),
+          std::vector<double>(columns.time_ns ? cloud.width : 0)};
+  std::size_t kept = 0;
   for (std::size_t i = 0; i < cloud.height; ++i) {
-    const std::uint8_t* record = cloud.data.data() + i * row;
-    for (std::size_t j = 0; j < cloud.width; ++j, record += cloud.point_step) {
-      const Point point{static_cast<float>(read.x(record)), static_cast<float>(read.y(record)),
-                        static_cast<float>(read.z(record)),
-                        read.intensity ? static_cast<float>(read.intensity(record)) : 0.f};
-      if (!io_internal::append_point(scan, point)) continue;
-      if (read.ring) {
+    // Where the row goes at first: what is kept of it moves up within itself.
+    Point* const here = scan.points.data() + kept;
+    read_row(cloud.data.data() + i * row_bytes, cloud.point_step, cloud.width, columns, here, row);
+    for (std::size_t j = 0; j < cloud.width; ++j) {
+      const Point point = here[j];
+      if (!io_internal::is_return(scan, point)) continue;
+      scan.points[kept] = point;
+      if (!std::isfinite(point.intensity)) scan.points[kept].intensity = 0.f;
+      if (columns.ring) {
         constexpr double kMostRings = 1024;
-        const double value = read.ring(record);
+        const double value = row.rings[j];
         rings_are_whole &= value >= 0 && value < kMostRings && value == std::floor(value);
-        scan.rings.push_back(rings_are_whole ? static_cast<std::uint16_t>(value) : std::uint16_t{0});
+        scan.rings[kept] = rings_are_whole ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
       }
-      if (read.time) raw_times.push_back(read.time(record) + (read.time_ns ? 1e-9 * read.time_ns(record) : 0.0));
+      if (columns.time) raw_times[kept] = row.times[j];
+      ++kept;
     }
   }
+  scan.points.resize(kept);
+  if (columns.ring) scan.rings.resize(kept);
+  if (columns.time) raw_times.resize(kept);
 }
 
 }  // namespace
@@ -135,13 +175,14 @@ Result<Scan> to_scan(const PointCloudView& cloud, const std::optional<double>& s
   if (intensity == nullptr) log_to(log, LogLevel::kWarning, what + ": no intensity field; 0 is used");
 
   const bool reversed = cloud.is_big_endian;
-  const Readers read{{position[0], reversed}, {position[1], reversed}, {position[2], reversed}, {intensity, reversed},
-                     {ring, reversed},        {time, reversed},        {time_ns, reversed}};
+  const Columns columns{{position[0], reversed}, {position[1], reversed}, {position[2], reversed},
+                        {intensity, reversed},   {ring, reversed},        {time, reversed},
+                        {time_ns, reversed}};
   Scan scan;
   if (stamp_s) scan.stamp_s = *stamp_s;
   std::vector<double> raw_times;
   bool rings_are_whole = true;
-  read_points(cloud, read, scan, raw_times, rings_are_whole);
+  read_points(cloud, columns, scan, raw_times, rings_are_whole);
   if (!rings_are_whole) {
     scan.rings.clear();
     log_to(log, LogLevel::kWarning, what + ": field '" + ring->name + "' holds no ring numbers; not used");
