@@ -1,5 +1,5 @@
 # The front door on a bare Debian 12 machine. `make demo` and `make test` install what is missing, build and run.
-.PHONY: demo test build configure packages bench lint format sanitize clean
+.PHONY: demo test oracles build configure packages bench lint format sanitize clean
 JOBS ?= $(shell nproc)
 # What ccache keeps of one clone serves the others.
 export CCACHE_BASEDIR ?= $(CURDIR)
@@ -10,7 +10,7 @@ demo: packages configure
 	@ln -sfn release/revisit build/revisit
 	@scripts/demo.sh
 
-test: build
+test: oracles build
 	ctest --preset release --parallel $(JOBS)
 
 build: packages configure
@@ -19,6 +19,11 @@ build: packages configure
 
 configure: packages
 	@cmake --preset release --log-level=NOTICE > /dev/null
+
+# The library of the .mcap format, with which tests compare ours.
+oracles: packages
+	@command -v npm > /dev/null || scripts/install_packages.sh nodejs npm
+	@[ -d tests/oracles/mcap/node_modules ] || npm ci --prefix tests/oracles/mcap --ignore-scripts --no-audit --no-fund --silent
 
 packages:
 	@scripts/install_packages.sh

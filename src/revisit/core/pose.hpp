@@ -58,13 +58,15 @@ inline Pose planar_pose(double x_m, double y_m, double yaw_rad) {
   return T;
 }
 
-/// The rotation that turns `up` (of unit length, not -z) to z and the heading as little as it can: into a frame that
+/// The rotation that turns `up` (of unit length) to z and the heading as little as it can: into a frame that
 /// stands upright in the same place. Exactly the identity where up is z.
 inline Pose upright_pose(const Eigen::Vector3f& up) {
   Pose T_upright_lidar = Pose::Identity();
   const Eigen::Vector3d axis = up.cast<double>().cross(Eigen::Vector3d::UnitZ());  // length: the sine of the tilt
   if (const double sine = axis.norm(); sine > 0.0)
     T_upright_lidar.linear() = Eigen::AngleAxisd(std::atan2(sine, up.z()), axis / sine).toRotationMatrix();
+  else if (up.z() < 0.f)  // upside down: about x, of all the ways there are
+    T_upright_lidar.linear() = Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
   return T_upright_lidar;
 }
 

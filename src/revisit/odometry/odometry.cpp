@@ -23,9 +23,11 @@ OdometryStep Odometry::follow(const Scan& scan, const std::optional<Pose>& T_ext
   const double stamp_s = is_late ? scan.stamp_s : last_stamp_s_ + Following::kTypicalPeriod_s;
   const auto T_previous_lidar = motion_by_external(T_external_lidar);
   const bool follows_closely = follows(stamp_s);
+  imu_.add(scan);
   OdometryStep step =
       source_ == Source::kExternal ? take(scan, stamp_s, T_previous_lidar) : match(scan, stamp_s, T_previous_lidar);
   step.stamp_s = stamp_s;
+  step.up = imu_.up();
   step.stamp_was_replaced = !is_late;
   step.is_connected = step.is_tracked && follows_closely && untracked_ == 0;
   step.segment = segment_;
@@ -68,14 +70,15 @@ OdometryStep Odometry::match(const Scan& scan, double stamp_s, const std::option
   OdometryStep step;
   step.motion = T_previous_lidar && follows(stamp_s) ? twist_of(*T_previous_lidar, stamp_s - last_stamp_s_)
                                                      : matcher_.predicted_motion(stamp_s);
+  if (step.motion) step.motion = with_imu(*step.motion);
   if (step.motion && is_swept) {
     step.compensated = compensated(scan, *step.motion);
     if (first_scan_) begin_map_again(*step.motion);
   }
   MatcherScan thinned = matcher_.thinned(step.compensated.empty() ? scan.points : step.compensated);
-  ScanMatch match = matcher_.match(stamp_s, thinned, T_previous_lidar);
+  ScanMatch match = matcher_.match(stamp_s, thinned, T_previous_lidar ? T_previous_lidar : motion_by_imu(stamp_s));
   if (is_swept && match.prediction_error_m > Following::kWrong_m) {
-    const Twist found = twist_of(match.T_previous_found, stamp_s - last_stamp_s_);
+    const Twist found = with_imu(twist_of(match.T_previous_found, stamp_s - last_stamp_s_));
     std::vector<Point> again = compensated(scan, found);
     if (first_scan_) begin_map_again(found);
     MatcherScan thinned_again = matcher_.thinned(again);
@@ -95,6 +98,20 @@ OdometryStep Odometry::match(const Scan& scan, double stamp_s, const std::option
   step.information = match.information;
   step.is_tracked = match.is_tracked;
   return step;
+}
+
+// The turn within the sweep as the IMU measured it.
+Twist Odometry::with_imu(Twist predicted) const {
+  if (imu_.rate_in_sweep_radps()) predicted.angular_radps = *imu_.rate_in_sweep_radps();
+  return predicted;
+}
+
+// The predicted motion since the scan before, turned as the IMU measured it.
+std::optional<Pose> Odometry::motion_by_imu(double stamp_s) const {
+  if (!imu_.turn_since_last() || !follows(stamp_s)) return std::nullopt;
+  Pose T = motion_after(matcher_.predicted_motion(stamp_s).value_or(Twist()), stamp_s - last_stamp_s_);
+  T.linear() = *imu_.turn_since_last();
+  return T;
 }
 
 // The first scan entered the map as it was swept: now that the motion is known, it enters it as it would have been seen

@@ -10,6 +10,7 @@
 #include <revisit/core/scan.hpp>
 #include <revisit/core/twist.hpp>
 #include <revisit/odometry/scan_matcher.hpp>
+#include <revisit/preprocess/imu_track.hpp>
 
 namespace revisit {
 
@@ -19,6 +20,7 @@ struct OdometryStep {
   Pose T_odom_lidar = Pose::Identity();      ///< the first scan is the origin
   Pose T_previous_lidar = Pose::Identity();  ///< motion since the scan before
   Matrix6 information = Matrix6::Zero();     ///< of that motion, as in LoopConstraint; zero where nothing measured it
+  std::optional<Eigen::Vector3f> up;         ///< in the frame of the scan, at its stamp; where an IMU came with it
   std::optional<Twist> motion;               ///< during the sweep; absent where nothing is known of it
   bool is_tracked = false;                   ///< otherwise the pose is the predicted one
   bool is_connected = false;                 ///< tracked, and soon after the scan before: T_previous_lidar is sure
@@ -30,8 +32,8 @@ struct OdometryStep {
 };
 
 /// Follows the sensor from scan to scan: the one odometry of detection, SLAM and calibration. Compensates the motion
-/// within each sweep, matches the scan with the map of what was seen lately, uses wheels where there are any, and says
-/// when it is lost. Scans come filtered by range. Belongs to one thread at a time; deterministic.
+/// within each sweep, matches the scan with the map of what was seen lately, uses wheels and an IMU where there are
+/// any, and says when it is lost. Scans come filtered by range. Belongs to one thread at a time; deterministic.
 class Odometry {
  public:
   enum class Source : std::uint8_t {
@@ -58,8 +60,12 @@ class Odometry {
   bool follows(double stamp_s) const;
   void begin_map_again(const Twist& motion);
 
+  Twist with_imu(Twist predicted) const;
+  std::optional<Pose> motion_by_imu(double stamp_s) const;
+
   Source source_;
   ScanMatcher matcher_;
+  ImuTrack imu_;
   bool has_last_ = false;
   double last_stamp_s_ = 0.0;
   Pose T_odom_last_ = Pose::Identity();

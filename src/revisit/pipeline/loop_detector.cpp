@@ -53,6 +53,7 @@ Result<LoopDetector::Prepared> LoopDetector::follow_and_prepare(Scan scan) {
   filter_range(scan, parameters_.preprocess);
   const OdometryStep step = odometry_.follow(scan);
   const double odometry_ms = watch.lap_ms();
+  if (step.up) scan.up = step.up;
   auto prepared = preparation_.prepare(std::move(scan), step.motion);
   if (!prepared) {
     previous_.reset();

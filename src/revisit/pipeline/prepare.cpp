@@ -7,6 +7,7 @@
 #include <oneapi/tbb/parallel_invoke.h>
 
 #include <revisit/core/stopwatch.hpp>
+#include <revisit/preprocess/imu_track.hpp>
 #include <revisit/preprocess/range_filter.hpp>
 #include <revisit/preprocess/rings.hpp>
 #include <revisit/preprocess/undistort.hpp>
@@ -36,7 +37,8 @@ Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const
 
   Rings rings;
   Eigen::Vector3f up;
-  tbb::parallel_invoke([&] { rings = find_rings(prepared.scan); }, [&] { up = find_up(points); });
+  const auto find_own_up = [&] { up = prepared.scan.up ? unless_level(*prepared.scan.up) : find_up(points); };
+  tbb::parallel_invoke([&] { rings = find_rings(prepared.scan); }, find_own_up);
   const Pose T_upright_lidar = upright_pose(up);
   rotate(points, T_upright_lidar);
   prepared.ground = segment_ground(prepared.scan, rings, parameters.preprocess);
@@ -78,6 +80,11 @@ ScanPreparation::ScanPreparation(const Parameters& parameters, const std::option
 
 Result<PreparedScan> ScanPreparation::prepare(Scan scan, const std::optional<Twist>& motion) {
   require_consistent(scan);
+  if (!scan.up && !scan.imu.empty()) {  // nobody followed the sensor: by the readings of this scan alone
+    ImuTrack imu;
+    imu.add(scan);
+    scan.up = imu.up();
+  }
   if (!scale_.is_settled()) {
     filter_range(scan, parameters_.preprocess);
     scale_.add(scan);

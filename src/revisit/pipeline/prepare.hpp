@@ -35,8 +35,9 @@ struct PreparedScan {
 };
 
 /// The paper's sections III-A and III-B in order. With the sensor's `motion`, the sweep is compensated after the ground
-/// was found. A scan of a tilted sensor is set upright while its ground is found and it is described (ThinCloud::up);
-/// its points stay in the sensor's frame. An error says why the scan describes no place.
+/// was found. A scan of a tilted sensor (Scan::up, or else by its ground) is set upright while its ground is found and
+/// it is described (ThinCloud::up); its points stay in the sensor's frame. An error says why the scan describes no
+/// place.
 Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const IntensityScale& scale,
                                   const IntensityCalibration& calibration = {},
                                   const std::optional<Twist>& motion = std::nullopt);

@@ -47,6 +47,7 @@ Result<SlamFrontEnd::Step> SlamFrontEnd::step(Scan scan, const std::optional<Pos
     return step;
   }
   scan.stamp_s = odometry.stamp_s;
+  if (odometry.up) scan.up = odometry.up;
   auto prepared = prepare(std::move(scan), odometry);
   step.prepare_ms = watch.lap_ms();
   if (!prepared && !keyframe_segment_) return prepared.error();

@@ -120,6 +120,10 @@ Eigen::Vector3f find_up(std::span<const Point> points) {
   return is_ground ? plane->normal : straight;
 }
 
+Eigen::Vector3f unless_level(const Eigen::Vector3f& up) {
+  return up.z() >= static_cast<float>(std::cos(to_radians(Upright::kLevel_deg))) ? Eigen::Vector3f::UnitZ().eval() : up;
+}
+
 void rotate(std::span<Point> points, const Pose& T_new_old) {
   const Eigen::Matrix3f R = T_new_old.linear().cast<float>();
   if (R.isIdentity(0.f)) return;

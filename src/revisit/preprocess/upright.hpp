@@ -15,6 +15,9 @@ namespace revisit {
 /// seen. The same points give the same answer.
 Eigen::Vector3f find_up(std::span<const Point> points);
 
+/// `up` as it was measured, but straight along z where it is within those 8 degrees.
+Eigen::Vector3f unless_level(const Eigen::Vector3f& up);
+
 /// Turns all points about the sensor, in place; left untouched by the identity.
 void rotate(std::span<Point> points, const Pose& T_new_old);
 

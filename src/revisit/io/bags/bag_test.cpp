@@ -252,8 +252,7 @@ TEST(Bag, DataThatWereChangedAreNoticed) {
   EXPECT_NE(message.error().message.find("checksum"), std::string::npos) << message.error().message;
 }
 
-#ifdef REVISIT_ROSBAG_LIST
-// Every message, as ROS's own library lists them.
+// Every message, as the programs in tests/oracles list them.
 std::vector<std::string> list(const Bag& bag) {
   std::vector<std::string> lines;
   for (std::size_t i = 0; i < bag.topics().size(); ++i)
@@ -264,8 +263,8 @@ std::vector<std::string> list(const Bag& bag) {
   return lines;
 }
 
-std::vector<std::string> list_by_rosbag(const fs::path& file) {
-  const auto outcome = testing_support::run_program(std::string(REVISIT_ROSBAG_LIST) + " " + file.string());
+std::vector<std::string> list_by(const std::string& program, const fs::path& file) {
+  const auto outcome = testing_support::run_program(program + " " + file.string());
   EXPECT_EQ(outcome.code, 0) << outcome.output;
   std::vector<std::string> lines;
   for (const std::string_view line : split_lines(outcome.output)) lines.emplace_back(line);
@@ -273,20 +272,8 @@ std::vector<std::string> list_by_rosbag(const fs::path& file) {
   return lines;
 }
 
-TEST(BagAgainstRosbag, TheSameMessagesInEveryBag) {
-  REVISIT_NEEDS_SHARED_DATA();
-  for (const char* file :
-       {"ros1/example.bag", "ros1/example-lz4.bag", "ros1/example-bz2.bag", "ros1/luminar_lz4.bag",
-        "ros1/one_of_each.bag", "ros1/two_types_one_topic.bag", "ros1/velodyne_concat_downsampled.bag",
-        "generated/ros1_lz4.bag", "../formats/ouster_packets_ros1.bag"}) {
-    const auto opened = open(recordings() / file);
-    ASSERT_TRUE(opened.bag) << opened.error;
-    EXPECT_EQ(list(*opened.bag), list_by_rosbag(recordings() / file)) << file;
-  }
-}
-
-TEST(BagAgainstRosbag, ReadsWhatIsWrittenHere) {
-  const fs::path file = fresh_folder() / "drive.bag";
+// One message of every kind that is written, ten times: several chunks.
+void write_drive(const fs::path& file) {
   auto writer = BagWriter::create(file);
   ASSERT_TRUE(writer) << writer.error().message;
   ASSERT_TRUE(writer->write_static_transform("base_link", "lidar", Pose::Identity()));
@@ -303,11 +290,55 @@ TEST(BagAgainstRosbag, ReadsWhatIsWrittenHere) {
     ASSERT_TRUE(writer->write_scan("/points", "lidar", scan));
   }
   ASSERT_TRUE(writer->finish());
+}
+
+// The format's own library, where `make test` has installed it.
+const fs::path kMcapList = testing_support::source_dir() / "tests" / "oracles" / "mcap";
+
+TEST(BagAgainstMcapCore, TheSameMessagesInEveryFile) {
+  REVISIT_NEEDS_SHARED_DATA();
+  if (!fs::exists(kMcapList / "node_modules")) GTEST_SKIP() << "needs `npm ci` in " << kMcapList;
+  for (const char* file :
+       {"mcap_conformance/OneMessage.mcap", "mcap_conformance/TenMessages.mcap",
+        "mcap_conformance/TenMessages-ch-chx-mx-pad-rch-rsh-st-sum.mcap", "ros2/split_mcap/multiple_files_0.mcap",
+        "ros2/service_events.mcap", "ros2/cdr_test_0.mcap", "generated/ros2_pointcloud2_none.mcap",
+        "generated/ros2_pointcloud2_zstd.mcap", "generated/ros2_pointcloud2_lz4.mcap"}) {
+    const auto opened = open(recordings() / file);
+    ASSERT_TRUE(opened.bag) << opened.error;
+    EXPECT_EQ(list(*opened.bag), list_by("node " + (kMcapList / "list.js").string(), recordings() / file)) << file;
+  }
+}
+
+TEST(BagAgainstMcapCore, ReadsWhatIsWrittenHere) {
+  if (!fs::exists(kMcapList / "node_modules")) GTEST_SKIP() << "needs `npm ci` in " << kMcapList;
+  const fs::path file = fresh_folder() / "drive.mcap";
+  write_drive(file);
   const auto opened = open(file);
   ASSERT_TRUE(opened.bag) << opened.error;
-  const auto own = list(*opened.bag);
-  EXPECT_EQ(own.size(), 31u);
-  EXPECT_EQ(own, list_by_rosbag(file));
+  EXPECT_EQ(list(*opened.bag).size(), 31u);
+  EXPECT_EQ(list(*opened.bag), list_by("node " + (kMcapList / "list.js").string(), file));
+}
+
+#ifdef REVISIT_ROSBAG_LIST
+TEST(BagAgainstRosbag, TheSameMessagesInEveryBag) {
+  REVISIT_NEEDS_SHARED_DATA();
+  for (const char* file :
+       {"ros1/example.bag", "ros1/example-lz4.bag", "ros1/example-bz2.bag", "ros1/luminar_lz4.bag",
+        "ros1/one_of_each.bag", "ros1/two_types_one_topic.bag", "ros1/velodyne_concat_downsampled.bag",
+        "generated/ros1_lz4.bag", "../formats/ouster_packets_ros1.bag"}) {
+    const auto opened = open(recordings() / file);
+    ASSERT_TRUE(opened.bag) << opened.error;
+    EXPECT_EQ(list(*opened.bag), list_by(REVISIT_ROSBAG_LIST, recordings() / file)) << file;
+  }
+}
+
+TEST(BagAgainstRosbag, ReadsWhatIsWrittenHere) {
+  const fs::path file = fresh_folder() / "drive.bag";
+  write_drive(file);
+  const auto opened = open(file);
+  ASSERT_TRUE(opened.bag) << opened.error;
+  EXPECT_EQ(list(*opened.bag).size(), 31u);
+  EXPECT_EQ(list(*opened.bag), list_by(REVISIT_ROSBAG_LIST, file));
 }
 #endif
 
