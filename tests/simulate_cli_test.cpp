@@ -41,6 +41,55 @@ TEST(SimulateCli, ADriveIsWrittenAndSimulatedAgainFromItsOwnFile) {
   EXPECT_NE(again.output.find("holds something already; name a new or empty folder"), std::string::npos);
 }
 
+std::string content_of(const fs::path& file) {
+  std::ifstream stream(file);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+TEST(SimulateCli, ABagAndAFolderOfOneDriveGiveTheSameLoopsToTheByte) {
+  const fs::path folder = fresh_folder();
+  const std::string drive = " --sensor vlp16 --length_m 50 --frames 20";
+  const std::string detect = " --retrieval.exclude_frames 5 --retrieval.exclude_s 0.5 --out ";
+  ASSERT_EQ(run("simulate --out " + (folder / "kitti").string() + drive).code, 0);
+  ASSERT_EQ(run("detect " + (folder / "kitti").string() + detect + (folder / "from_kitti").string()).code, 0);
+  const std::string expected = content_of(folder / "from_kitti" / "loops.csv");
+  EXPECT_GT(expected.size(), 500u);
+  for (const char* name : {"drive.bag", "drive.mcap", "drive.db3"}) {
+    const fs::path bag = folder / name, results = folder / (std::string("from_") + name);
+    const auto written = run("simulate --out " + bag.string() + drive);
+    ASSERT_EQ(written.code, 0) << written.output;
+    EXPECT_TRUE(fs::exists(bag.string() + ".poses.tum"));
+    const auto found = run("detect " + bag.string() + detect + results.string());
+    ASSERT_EQ(found.code, 0) << found.output;
+    EXPECT_EQ(content_of(results / "loops.csv"), expected) << name;
+    EXPECT_EQ(content_of(results / "candidates.csv"), content_of(folder / "from_kitti" / "candidates.csv")) << name;
+
+    const fs::path back = folder / (bag.extension().string().substr(1) + "_again");
+    const auto converted = run("convert " + bag.string() + " --out " + back.string());
+    ASSERT_EQ(converted.code, 0) << converted.output;
+    for (const char* file : {"velodyne/000007.bin", "velodyne_times/000007.bin", "velodyne_rings/000007.bin"})
+      EXPECT_TRUE(content_of(back / file) == content_of(folder / "kitti" / file)) << name << " " << file;
+    EXPECT_EQ(run("evaluate " + results.string() + " --reference " + bag.string() + ".poses.tum").code, 0);
+  }
+  EXPECT_NE(run("simulate --out " + (folder / "drive.bag").string() + drive).output.find("exists already"),
+            std::string::npos);
+}
+
+TEST(SimulateCli, InfoListsTheTopicsOfABagAndWhatItFound) {
+  const fs::path bag = fresh_folder() / "drive.mcap";
+  ASSERT_EQ(run("simulate --out " + bag.string() + " --sensor vlp16 --length_m 50 --frames 10 --imu true").code, 0);
+  const auto told = run("info " + bag.string());
+  EXPECT_EQ(told.code, 0) << told.output;
+  for (const char* text : {"/points", "sensor_msgs/PointCloud2", "10.0  scans", "IMU", "at the middle of the sweep",
+                           "field 'time', s from the stamp", "VLP-16 or alike", "recorded 0.050 s after its stamp"})
+    EXPECT_NE(told.output.find(text), std::string::npos) << text << "\n" << told.output;
+  const auto slam = run("slam " + bag.string() + " --no-map --out " + (bag.parent_path() / "map").string());
+  EXPECT_EQ(slam.code, 0) << slam.output;
+  const auto wrong = run("detect " + bag.string() + " --topic /none --out " + (bag.parent_path() / "r").string());
+  EXPECT_EQ(wrong.code, 1);
+  EXPECT_NE(wrong.output.find("no topic '/none' of scans; there are: /points"), std::string::npos) << wrong.output;
+}
+
 TEST(SimulateCli, WrongNamesAreErrorsThatTellTheRightOnes) {
   const std::string out = " --out " + (fresh_folder() / "x").string();
   EXPECT_NE(run("simulate --sensor hdl32e" + out).output.find("allowed: hdl64e, vlp16, os0-128, rosette"),

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <vector>
@@ -99,6 +100,26 @@ Status print_topics(const std::string& input, const RecordingOptions& options) {
   return ok();
 }
 
+// Gaps and stamps that do not increase, in the first minute.
+void print_gaps(const Recording& recording) {
+  constexpr std::size_t kMost = 600;
+  const std::size_t scans = std::min(recording.size(), kMost);
+  std::vector<double> steps_s;
+  for (std::size_t i = 1; i < scans; ++i) steps_s.push_back(recording.stamp_s(i) - recording.stamp_s(i - 1));
+  if (steps_s.size() < 2) return;
+  std::vector<double> sorted = steps_s;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+  const double typical_s = sorted[sorted.size() / 2];
+  const auto gaps =
+      std::count_if(steps_s.begin(), steps_s.end(), [&](double step_s) { return step_s > 1.5 * typical_s; });
+  const auto backwards = std::count_if(steps_s.begin(), steps_s.end(), [](double step_s) { return step_s <= 0.0; });
+  if (gaps > 0)
+    std::printf("gaps         %td among the first %zu scans, the longest %.2f s\n", gaps, scans,
+                *std::max_element(steps_s.begin(), steps_s.end()));
+  if (backwards > 0)
+    std::printf("stamps       %td of the first %zu are not after the one before (duplicates?)\n", backwards, scans);
+}
+
 int info_of_recording(const InfoOptions& options, const Parameters& parameters) {
   const std::string& folder = options.input;
   if (has_topics(folder))
@@ -116,6 +137,7 @@ int info_of_recording(const InfoOptions& options, const Parameters& parameters) 
     std::printf("rate         unknown: no times; 0.1 s a frame is assumed\n");
   else if (span_s > 0.0)
     std::printf("rate         %.2f Hz, %.1f s long\n", frames / span_s, span_s);
+  if (recording.has_times()) print_gaps(recording);
   std::printf("poses        %zu\n", recording.trajectory().entries.size());
   for (const std::string& finding : recording.findings()) {
     const auto colon = finding.find(": ");

@@ -32,9 +32,9 @@ struct Scan {
   std::vector<float> times_s;          ///< time of each point from `stamp_s`, seconds; may be negative
   std::size_t dropped_non_finite = 0;  ///< points left out by the reader: NaN or infinite
   std::size_t dropped_at_origin = 0;   ///< points left out by the reader: exactly (0,0,0), "no return"
-  std::vector<ImuSample> imu;          ///< from before the sweep to its end, increasing times; may be empty
+  std::vector<ImuSample> imu = {};     ///< from before the sweep to its end, increasing times; may be empty
   /// Which way is up, a unit vector in the frame of the points, where something knows it (a mounting, gravity).
-  std::optional<Eigen::Vector3f> up;
+  std::optional<Eigen::Vector3f> up = std::nullopt;
 };
 
 /// Throws std::invalid_argument unless `rings` and `times_s` are empty or hold one entry a point.

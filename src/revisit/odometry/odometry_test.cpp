@@ -57,6 +57,44 @@ TEST(Odometry, CompensatesTheSweepItFollows) {
   EXPECT_LT(worst_m, 0.1);
 }
 
+// A sensor that is shaken about the vertical: stands still at 0, 45, 0, -45 ... degrees at the stamps.
+Scan shaken_scan(int i, bool has_imu) {
+  static const SyntheticWorld world(31);
+  const auto yaw_at = [](double scans) { return to_radians(45.0) * std::sin(0.5 * kPi * scans); };
+  Scan scan = world.scan(SyntheticWorld::at(0.0, 0.0, yaw_at(i)), {32, 600, -24.8, 5.0}, static_cast<unsigned>(i));
+  scan.frame = FrameId{i};
+  scan.stamp_s = kPeriod_s * i;
+  for (int k = -20; has_imu && k <= 0; ++k) {
+    const double at = i + 0.05 * k;  // in scans
+    const auto rate = static_cast<float>((yaw_at(at) - yaw_at(at - 0.05)) / (0.05 * kPeriod_s));
+    scan.imu.push_back({0.05 * kPeriod_s * k, {0.f, 0.f, rate}, {0.f, 0.f, 9.81f}});
+  }
+  return scan;
+}
+
+TEST(Odometry, AnImuPredictsTurnsAndKnowsUp) {
+  double off_without_m = 0.0;
+  for (const bool has_imu : {false, true}) {
+    Odometry odometry;
+    double off_m = 0.0;
+    for (int i = 0; i < 12; ++i) {
+      const OdometryStep step = odometry.follow(shaken_scan(i, has_imu));
+      off_m = std::max(off_m, step.T_odom_lidar.translation().norm());
+      if (!has_imu) {
+        EXPECT_FALSE(step.up);
+        continue;
+      }
+      EXPECT_TRUE(step.is_tracked) << i;
+      ASSERT_TRUE(step.up);
+      EXPECT_GT(step.up->z(), 0.999f);
+      if (i == 0) continue;
+      EXPECT_NEAR(std::abs(yaw_of(step.T_previous_lidar)), to_radians(45.0), 0.02) << i;
+    }
+    if (!has_imu) off_without_m = off_m;
+    EXPECT_LT(off_m, has_imu ? 0.05 : 100.0) << "without: " << off_without_m;
+  }
+}
+
 TEST(Odometry, AfterFiveScansElsewhereItIsLostAndBeginsASegment) {
   Odometry odometry;
   for (int i = 0; i < 12; ++i) odometry.follow(swept_scan(i));
@@ -68,7 +106,9 @@ TEST(Odometry, AfterFiveScansElsewhereItIsLostAndBeginsASegment) {
     const OdometryStep step = odometry.follow(std::move(scan));
     if (step.lost && lost_at < 0) lost_at = i;
     EXPECT_EQ(step.segment, lost_at >= 0 && i > lost_at ? 1 : 0) << i;
-    if (i == 12) EXPECT_FALSE(step.is_connected);
+    if (i == 12) {
+      EXPECT_FALSE(step.is_connected);
+    }
   }
   EXPECT_EQ(lost_at, 16);
 }

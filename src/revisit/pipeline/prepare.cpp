@@ -39,6 +39,7 @@ Result<PreparedScan> prepare_scan(Scan scan, const Parameters& parameters, const
   Eigen::Vector3f up;
   const auto find_own_up = [&] { up = prepared.scan.up ? unless_level(*prepared.scan.up) : find_up(points); };
   tbb::parallel_invoke([&] { rings = find_rings(prepared.scan); }, find_own_up);
+  if (up.z() < 0.f) turn_over(rings);
   const Pose T_upright_lidar = upright_pose(up);
   rotate(points, T_upright_lidar);
   prepared.ground = segment_ground(prepared.scan, rings, parameters.preprocess);

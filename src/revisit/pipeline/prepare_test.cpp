@@ -23,6 +23,19 @@ TEST(PrepareScan, GroundIsDescribedOnlyIfAsked) {
   EXPECT_EQ(with->cloud.points.size(), without->cloud.points.size()) << "registration keeps the ground";
 }
 
+TEST(PrepareScan, AScanTakenUpsideDownDescribesTheSamePlace) {
+  const Scan scan = some_scan();
+  Scan turned = scan;  // about x
+  turned.up = -Eigen::Vector3f::UnitZ();
+  for (Point& p : turned.points) p = {p.x, -p.y, -p.z, p.intensity};
+  const auto upright = prepare_scan(scan, {}, {}), hanging = prepare_scan(turned, {}, {});
+  ASSERT_TRUE(upright && hanging);
+  EXPECT_EQ(upright->descriptor.intensity, hanging->descriptor.intensity);
+  EXPECT_EQ(upright->ground.is_ground, hanging->ground.is_ground);
+  EXPECT_EQ(upright->ground_z_m, hanging->ground_z_m);
+  EXPECT_LT(hanging->cloud.up.z(), -0.99f);
+}
+
 TEST(PrepareScan, ScansThatDescribeNoPlaceSayWhy) {
   Scan one_cell;
   for (int i = 0; i < 500; ++i) one_cell.points.push_back({20.f + 1e-4f * static_cast<float>(i), 3.f, 0.f, 0.5f});

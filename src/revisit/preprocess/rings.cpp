@@ -225,4 +225,11 @@ Rings find_rings(const Scan& scan) {
   return {};
 }
 
+void turn_over(Rings& rings) {
+  const auto last = static_cast<int>(rings.count()) - 1;
+  for (std::uint16_t& ring : rings.of_point) ring = static_cast<std::uint16_t>(last - ring);
+  std::reverse(rings.elevations_rad.begin(), rings.elevations_rad.end());
+  for (float& elevation_rad : rings.elevations_rad) elevation_rad = -elevation_rad;
+}
+
 }  // namespace revisit

@@ -30,4 +30,7 @@ struct Rings {
 /// Linear in the number of points; a few milliseconds for 120,000.
 Rings find_rings(const Scan& scan);
 
+/// Numbers the rings the other way round: those of a sensor that hangs upside down.
+void turn_over(Rings& rings);
+
 }  // namespace revisit

@@ -183,7 +183,8 @@ TEST(BagRecording, OdometryComesWithTheTransformToTheLidar) {
   ASSERT_TRUE(writer->write_static_transform("mast", "lidar", T_base_lidar));
   for (int i = 0; i < 20; ++i) {
     ASSERT_TRUE(writer->write_odometry("/odom", "odom", "base_link", 1'600'000'000 + 0.05 * i, moved(0.1 * i, 0.0)));
-    if (i % 2 == 0) ASSERT_TRUE(writer->write_scan("/points", "lidar", scan_at(i / 2)));
+    if (i % 2 != 0) continue;
+    ASSERT_TRUE(writer->write_scan("/points", "lidar", scan_at(i / 2)));
   }
   ASSERT_TRUE(writer->finish());
   const auto opened = open(file);
@@ -224,7 +225,8 @@ TEST(BagRecording, ImuComesInTheFrameOfTheLidarAndAroundTheSweep) {
     for (int i = 0; i < 100; ++i) {
       ASSERT_TRUE(
           writer->write_imu("/imu", "imu", 1'600'000'000 + 0.01 * i, {0.0, {0.1f, 0.2f, 0.3f}, {0.f, 0.f, -9.8f}}));
-      if (i % 10 == 5) ASSERT_TRUE(writer->write_scan("/points", "lidar", scan_at(i / 10)));
+      if (i % 10 != 5) continue;
+      ASSERT_TRUE(writer->write_scan("/points", "lidar", scan_at(i / 10)));
     }
     ASSERT_TRUE(writer->finish());
     const auto opened = open(file);
@@ -295,7 +297,9 @@ TEST(BagRecording, LivoxMessagesOfBothRosAndBothDrivers) {
         EXPECT_EQ(scan->points.back().z, 3.f);
         EXPECT_EQ(scan->points.back().intensity, static_cast<float>(points - 1));
         EXPECT_EQ(scan->rings.back(), (points - 1) % 6);
-        if (points > 2) EXPECT_NEAR(scan->times_s.back(), 0.099f, 1e-6f);
+        if (points > 2) {
+          EXPECT_NEAR(scan->times_s.back(), 0.099f, 1e-6f);
+        }
       }
 }
 

@@ -26,7 +26,7 @@ void write_zeros(MessageWriter& message, int count) {
   for (int i = 0; i < count; ++i) message.number(0.0);
 }
 
-struct Field {
+struct WrittenField {
   const char* name;
   std::uint8_t type;
   std::uint32_t bytes;
@@ -65,7 +65,8 @@ Status BagWriter::write(const std::string& topic, const std::string& type, std::
 Status BagWriter::write_scan(const std::string& topic, const std::string& frame_id, const Scan& scan) {
   require_consistent(scan);
   constexpr std::uint8_t kUint16 = 4, kFloat32 = 7;
-  std::vector<Field> fields{{"x", kFloat32, 4}, {"y", kFloat32, 4}, {"z", kFloat32, 4}, {"intensity", kFloat32, 4}};
+  std::vector<WrittenField> fields{
+      {"x", kFloat32, 4}, {"y", kFloat32, 4}, {"z", kFloat32, 4}, {"intensity", kFloat32, 4}};
   if (!scan.rings.empty()) fields.push_back({"ring", kUint16, 2});
   if (!scan.times_s.empty()) fields.push_back({"time", kFloat32, 4});
   io_internal::ByteBuffer points;
@@ -80,7 +81,7 @@ Status BagWriter::write_scan(const std::string& topic, const std::string& frame_
   message.number(static_cast<std::uint32_t>(scan.points.size()));
   message.number(static_cast<std::uint32_t>(fields.size()));
   std::uint32_t offset = 0;
-  for (const Field& field : fields) {
+  for (const WrittenField& field : fields) {
     message.text(field.name);
     message.number(offset);
     message.number(field.type);

@@ -20,6 +20,12 @@ std::optional<std::uint32_t> ChunkedBag::topic_of(std::uint32_t connection) cons
   return found == topic_of_connection_.end() ? std::nullopt : std::optional(found->second);
 }
 
+void ChunkedBag::forget_index() {
+  topics_.clear();
+  chunks_.clear();
+  topic_of_connection_.clear();
+}
+
 bool ChunkedBag::add_chunk_without_index(Chunk chunk, const SharedBytes& bytes) {
   const auto messages = entries(bytes.bytes);
   if (!messages) return false;

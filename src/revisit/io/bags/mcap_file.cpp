@@ -8,25 +8,10 @@
 #include <revisit/io/internal/byte_cursor.hpp>
 #include <revisit/io/internal/chunked_bag.hpp>
 #include <revisit/io/internal/decompress.hpp>
+#include <revisit/io/internal/mcap_format.hpp>
 
 namespace revisit::io_internal {
 namespace {
-
-// mcap.dev/spec: records of an opcode, the length of their content (uint64), and the content.
-constexpr std::string_view kMagic{"\x89MCAP0\r\n", 8};
-constexpr std::uint64_t kRecordHead = 9;
-enum Op : std::uint8_t {
-  kHeader = 1,
-  kFooter = 2,
-  kSchema = 3,
-  kChannel = 4,
-  kMessage = 5,
-  kChunk = 6,
-  kMessageIndex = 7,
-  kChunkIndex = 8,
-  kStatistics = 11,
-  kDataEnd = 15
-};
 
 std::int64_t to_ns(std::uint64_t time) {
   return static_cast<std::int64_t>(std::min<std::uint64_t>(time, std::numeric_limits<std::int64_t>::max()));
@@ -38,13 +23,12 @@ class McapFile final : public ChunkedBag {
 
   Status open(const LogSink& log) {
     if (file_.size() == 0) return Error{file_.path().string() + ": empty file"};
-    const auto magic = file_.read(0, std::min<std::uint64_t>(kMagic.size(), file_.size()));
+    const auto magic = file_.read(0, std::min<std::uint64_t>(mcap::kMagic.size(), file_.size()));
     if (!magic) return magic.error();
-    if (std::string_view(reinterpret_cast<const char*>(magic->bytes.data()), magic->bytes.size()) != kMagic)
+    if (std::string_view(reinterpret_cast<const char*>(magic->bytes.data()), magic->bytes.size()) != mcap::kMagic)
       return Error{file_.path().string() + ": does not begin as an .mcap file of version 0"};
     if (!read_summary()) {
-      topics_.clear();
-      chunks_.clear();
+      forget_index();
       if (const Status status = read_without_index(log); !status) return status;
     }
     finish_index();
@@ -58,25 +42,26 @@ class McapFile final : public ChunkedBag {
   };
 
   Result<Record> record_at(std::uint64_t offset) const {
-    const auto head = file_.read(offset, kRecordHead);
+    const auto head = file_.read(offset, mcap::kRecordHead);
     if (!head) return head.error();
     const Record record{head->bytes[0], load_number<std::uint64_t>(head->bytes.data() + 1)};
-    if (record.size > file_.size() - offset - kRecordHead)
+    if (record.size > file_.size() - offset - mcap::kRecordHead)
       return file_.error(offset, "a record of " + std::to_string(record.size) + " bytes goes beyond the end");
     return record;
   }
 
   // The summary at the end; false where there is none, or it says too little to find every message.
   bool read_summary() {
-    constexpr std::uint64_t kFooterSize = kRecordHead + 20;
-    if (file_.size() < 2 * kMagic.size() + kFooterSize) return false;
-    const std::uint64_t footer_at = file_.size() - kMagic.size() - kFooterSize;
-    const auto footer = file_.read(footer_at, kFooterSize + kMagic.size());
-    if (!footer || footer->bytes[0] != kFooter) return false;
-    if (!std::equal(kMagic.begin(), kMagic.end(), footer->bytes.end() - static_cast<std::ptrdiff_t>(kMagic.size()),
+    constexpr std::uint64_t kFooterSize = mcap::kRecordHead + 20;
+    if (file_.size() < 2 * mcap::kMagic.size() + kFooterSize) return false;
+    const std::uint64_t footer_at = file_.size() - mcap::kMagic.size() - kFooterSize;
+    const auto footer = file_.read(footer_at, kFooterSize + mcap::kMagic.size());
+    if (!footer || footer->bytes[0] != mcap::kFooter) return false;
+    if (!std::equal(mcap::kMagic.begin(), mcap::kMagic.end(),
+                    footer->bytes.end() - static_cast<std::ptrdiff_t>(mcap::kMagic.size()),
                     [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; }))
       return false;
-    const auto start = load_number<std::uint64_t>(footer->bytes.data() + kRecordHead);
+    const auto start = load_number<std::uint64_t>(footer->bytes.data() + mcap::kRecordHead);
     if (start == 0 || start >= footer_at) return false;
     const auto summary = file_.read(start, footer_at - start);
     if (!summary) return false;
@@ -85,8 +70,8 @@ class McapFile final : public ChunkedBag {
       const auto op = cursor.number<std::uint8_t>();
       const ByteSpan content = cursor.take(cursor.number<std::uint64_t>());
       if (cursor.failed() || !learn(op, content)) return false;
-      if (op == kChunkIndex && !add_chunk_index(content)) return false;
-      if (op == kStatistics) expected = ByteCursor(content).number<std::uint64_t>();
+      if (op == mcap::kChunkIndex && !add_chunk_index(content)) return false;
+      if (op == mcap::kStatistics) expected = ByteCursor(content).number<std::uint64_t>();
     }
     std::uint64_t found = 0;
     for (const Chunk& chunk : chunks_)
@@ -97,12 +82,12 @@ class McapFile final : public ChunkedBag {
   // What schemas and channels say. False where it cannot be read.
   bool learn(std::uint8_t op, ByteSpan content) {
     ByteCursor cursor(content);
-    if (op == kSchema) {
+    if (op == mcap::kSchema) {
       const auto id = cursor.number<std::uint16_t>();
       Schema schema{std::string(cursor.text()), std::string(cursor.text()), {}};
       schema.text = cursor.text();
       schemas_[id] = std::move(schema);
-    } else if (op == kChannel) {
+    } else if (op == mcap::kChannel) {
       const auto id = cursor.number<std::uint16_t>();
       const auto schema = schemas_.find(cursor.number<std::uint16_t>());
       BagTopic topic;
@@ -135,7 +120,7 @@ class McapFile final : public ChunkedBag {
     const auto indexes_size = cursor.number<std::uint64_t>();
     if (cursor.failed() || chunk.offset > file_.size() || chunk.size > file_.size() - chunk.offset) return false;
     if (channel_at.empty()) return indexes_size == 0 && chunk.first_ns == 0 && chunk.last_ns == 0;
-    constexpr std::uint64_t kIndexHead = kRecordHead + 6, kIndexRow = 16;
+    constexpr std::uint64_t kIndexHead = mcap::kRecordHead + 6, kIndexRow = 16;
     const std::uint64_t end = chunk.offset + chunk.size + indexes_size;
     std::map<std::uint32_t, std::uint32_t> counts;
     for (auto it = channel_at.begin(); it != channel_at.end(); ++it) {
@@ -155,7 +140,7 @@ class McapFile final : public ChunkedBag {
   Status read_without_index(const LogSink& log) {
     constexpr std::uint64_t kLargestRun = 4 << 20;
     std::size_t broken = 0;
-    std::uint64_t offset = kMagic.size(), run = 0;  // where a run of bare messages began
+    std::uint64_t offset = mcap::kMagic.size(), run = 0;  // where a run of bare messages began
     bool is_closed = false;
     const auto end_run = [&](std::uint64_t end) {
       if (run == 0) return;
@@ -170,25 +155,25 @@ class McapFile final : public ChunkedBag {
     while (offset < file_.size()) {
       const auto record = record_at(offset);
       if (!record) break;
-      if (record->op != kMessage || (run != 0 && offset - run > kLargestRun)) end_run(offset);
-      if (record->op == kMessage && run == 0) run = offset;
-      if (record->op == kSchema || record->op == kChannel) {
-        const auto content = file_.read(offset + kRecordHead, record->size);
+      if (record->op != mcap::kMessage || (run != 0 && offset - run > kLargestRun)) end_run(offset);
+      if (record->op == mcap::kMessage && run == 0) run = offset;
+      if (record->op == mcap::kSchema || record->op == mcap::kChannel) {
+        const auto content = file_.read(offset + mcap::kRecordHead, record->size);
         if (!content || !learn(record->op, content->bytes)) ++broken;
-      } else if (record->op == kChunk) {
+      } else if (record->op == mcap::kChunk) {
         Chunk chunk;
         chunk.offset = offset;
-        chunk.size = kRecordHead + record->size;
+        chunk.size = mcap::kRecordHead + record->size;
         const auto bytes = load(chunk);
         if (bytes) learn_all(bytes->bytes);
         if (!bytes || !add_chunk_without_index(chunk, *bytes)) ++broken;
-      } else if (record->op == kDataEnd || record->op == kFooter) {
+      } else if (record->op == mcap::kDataEnd || record->op == mcap::kFooter) {
         is_closed = true;
         break;
       } else if (record->op == 0) {
         break;
       }
-      offset += kRecordHead + record->size;
+      offset += mcap::kRecordHead + record->size;
     }
     end_run(std::min(offset, file_.size()));
     if (!is_closed || broken > 0)
@@ -216,7 +201,7 @@ class McapFile final : public ChunkedBag {
     const auto checksum = cursor.number<std::uint32_t>();
     const std::string_view method = cursor.text();
     const ByteSpan data = cursor.take(cursor.number<std::uint64_t>());
-    if (op != kChunk || cursor.failed()) return file_.error(chunk.offset, "is no whole chunk");
+    if (op != mcap::kChunk || cursor.failed()) return file_.error(chunk.offset, "is no whole chunk");
     auto bytes = decompress(method, {record->owner, data}, size);
     if (!bytes) return file_.error(chunk.offset, bytes.error().message);
     if (checksum != 0 && crc32_z(0, bytes->bytes.data(), bytes->bytes.size()) != checksum)
@@ -231,7 +216,7 @@ class McapFile final : public ChunkedBag {
       const auto op = cursor.number<std::uint8_t>();
       const ByteSpan content = cursor.take(cursor.number<std::uint64_t>());
       if (cursor.failed()) return Error{"a record in the chunk goes beyond its end"};
-      if (op != kMessage) continue;
+      if (op != mcap::kMessage) continue;
       if (content.size() < kMessageHead) return Error{"a message in the chunk has no head"};
       ByteCursor head(content);
       const auto topic = topic_of(head.number<std::uint16_t>());

@@ -6,17 +6,14 @@
 #include <revisit/io/internal/byte_cursor.hpp>
 #include <revisit/io/internal/chunked_bag.hpp>
 #include <revisit/io/internal/decompress.hpp>
+#include <revisit/io/internal/ros1_format.hpp>
 
 namespace revisit::io_internal {
 namespace {
 
-// Bag format 2.0: records of a header (fields "name=value") and data, both preceded by their length.
-constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
-enum Op : std::uint8_t { kMessage = 2, kBagHeader = 3, kIndex = 4, kChunk = 5, kChunkInfo = 6, kConnection = 7 };
-
-class Fields {
+class RecordFields {
  public:
-  explicit Fields(ByteSpan header) {
+  explicit RecordFields(ByteSpan header) {
     ByteCursor cursor(header);
     while (cursor.left() > 0) {
       const std::string_view field = cursor.text();
@@ -53,16 +50,15 @@ class Ros1Bag final : public ChunkedBag {
   explicit Ros1Bag(RandomAccessFile file) : ChunkedBag(std::move(file)) {}
 
   Status open(const LogSink& log) {
-    const auto magic = file_.read(0, std::min<std::uint64_t>(kMagic.size(), file_.size()));
+    const auto magic = file_.read(0, std::min<std::uint64_t>(ros1::kMagic.size(), file_.size()));
     if (!magic) return magic.error();
     if (magic->bytes.empty()) return Error{file_.path().string() + ": empty file"};
     const std::string_view found(reinterpret_cast<const char*>(magic->bytes.data()), magic->bytes.size());
-    if (found != kMagic)
+    if (found != ros1::kMagic)
       return Error{file_.path().string() + ": is no ROS 1 bag of version 2.0" +
                    (found.starts_with("#ROS") ? "; `rosbag fix` brings older ones up to date" : "")};
     if (!read_index()) {
-      topics_.clear();
-      chunks_.clear();
+      forget_index();
       if (const Status status = read_without_index(log); !status) return status;
     }
     finish_index();
@@ -89,33 +85,33 @@ class Ros1Bag final : public ChunkedBag {
                   load_number<std::uint32_t>(header->bytes.data() + header_size)};
   }
 
-  static BagTopic topic_in(const Fields& fields, ByteSpan data) {
-    const Fields facts(data);
+  static BagTopic topic_in(const RecordFields& fields, ByteSpan data) {
+    const RecordFields facts(data);
     return {fields.text("topic"), facts.text("type"), "ros1", facts.text("message_definition"), 0};
   }
 
   // False where there is none, or it is broken: a bag that was not closed.
   bool read_index() {
-    const auto bag = record_at(kMagic.size());
+    const auto bag = record_at(ros1::kMagic.size());
     if (!bag) return false;
-    const Fields header(bag->header.bytes);
+    const RecordFields header(bag->header.bytes);
     const auto index = header.number<std::uint64_t>("index_pos");
-    if (header.op() != kBagHeader || !index || *index == 0 || *index > file_.size()) return false;
+    if (header.op() != ros1::kBagHeader || !index || *index == 0 || *index > file_.size()) return false;
     const auto bytes = file_.read(*index, file_.size() - *index);
     if (!bytes) return false;
     ByteCursor cursor(bytes->bytes);
     while (cursor.left() > 0) {
-      const Fields fields(cursor.block());
+      const RecordFields fields(cursor.block());
       const ByteSpan data = cursor.block();
       if (cursor.failed() || !fields.is_whole()) return false;
-      if (fields.op() == kConnection)
+      if (fields.op() == ros1::kConnection)
         add_connection(fields.number<std::uint32_t>("conn").value_or(0), topic_in(fields, data));
-      if (fields.op() == kChunkInfo && !add_chunk_info(fields, data)) return false;
+      if (fields.op() == ros1::kChunkInfo && !add_chunk_info(fields, data)) return false;
     }
     return chunks_.size() == header.number<std::uint32_t>("chunk_count").value_or(0);
   }
 
-  bool add_chunk_info(const Fields& fields, ByteSpan data) {
+  bool add_chunk_info(const RecordFields& fields, ByteSpan data) {
     Chunk chunk;
     const auto offset = fields.number<std::uint64_t>("chunk_pos");
     if (!offset || *offset >= file_.size()) return false;
@@ -137,12 +133,12 @@ class Ros1Bag final : public ChunkedBag {
   // Chunk by chunk from the front, as far as they are whole.
   Status read_without_index(const LogSink& log) {
     std::size_t chunks = 0, broken = 0;
-    std::uint64_t offset = kMagic.size();
+    std::uint64_t offset = ros1::kMagic.size();
     while (offset < file_.size()) {
       const auto record = record_at(offset);
       if (!record) break;
-      const Fields fields(record->header.bytes);
-      if (fields.op() == kChunk) {
+      const RecordFields fields(record->header.bytes);
+      if (fields.op() == ros1::kChunk) {
         ++chunks;
         Chunk chunk;
         chunk.offset = offset;
@@ -164,10 +160,10 @@ class Ros1Bag final : public ChunkedBag {
 
   void learn_connections(ByteSpan bytes) {
     for (ByteCursor cursor(bytes); cursor.left() > 0;) {
-      const Fields fields(cursor.block());
+      const RecordFields fields(cursor.block());
       const ByteSpan data = cursor.block();
       if (cursor.failed()) return;
-      if (fields.op() == kConnection)
+      if (fields.op() == ros1::kConnection)
         add_connection(fields.number<std::uint32_t>("conn").value_or(0), topic_in(fields, data));
     }
   }
@@ -175,9 +171,9 @@ class Ros1Bag final : public ChunkedBag {
   Result<SharedBytes> load(const Chunk& chunk) const override {
     const auto record = record_at(chunk.offset);
     if (!record) return record.error();
-    const Fields fields(record->header.bytes);
+    const RecordFields fields(record->header.bytes);
     const auto size = fields.number<std::uint32_t>("size");
-    if (fields.op() != kChunk || !size) return file_.error(chunk.offset, "is no chunk");
+    if (fields.op() != ros1::kChunk || !size) return file_.error(chunk.offset, "is no chunk");
     const auto data = file_.read(record->data, record->data_size);
     if (!data) return data.error();
     auto bytes = decompress(fields.text("compression"), *data, *size);
@@ -191,9 +187,9 @@ class Ros1Bag final : public ChunkedBag {
       const ByteSpan header = cursor.block();
       const ByteSpan data = cursor.block();
       if (cursor.failed()) return Error{"a record in the chunk goes beyond its end"};
-      const Fields fields(header);
+      const RecordFields fields(header);
       const auto connection = fields.number<std::uint32_t>("conn");
-      if (fields.op() != kMessage || !connection) continue;
+      if (fields.op() != ros1::kMessage || !connection) continue;
       if (const auto topic = topic_of(*connection))
         result.push_back({*topic, fields.time_ns("time"), cursor.position() - data.size(), data.size()});
     }

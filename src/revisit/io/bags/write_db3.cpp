@@ -9,7 +9,7 @@ namespace revisit::io_internal {
 namespace {
 
 // As rosbag2 writes it (schema 4), which embeds the definitions.
-constexpr const char* kSchema = R"(
+constexpr const char* kDb3Schema = R"(
 PRAGMA journal_mode = MEMORY;
 CREATE TABLE schema(schema_version INTEGER PRIMARY KEY,ros_distro TEXT NOT NULL);
 CREATE TABLE metadata(id INTEGER PRIMARY KEY,metadata_version INTEGER NOT NULL,metadata TEXT NOT NULL);
@@ -32,7 +32,7 @@ class Db3Writer final : public BagFileWriter {
 
   Status open() {
     if (sqlite3_open(path_.c_str(), &database_) != SQLITE_OK) return error();
-    if (const Status status = run(kSchema); !status) return status;
+    if (const Status status = run(kDb3Schema); !status) return status;
     return prepare("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", insert_);
   }
 

@@ -9,27 +9,13 @@
 
 #include <revisit/io/internal/bag_file_writer.hpp>
 #include <revisit/io/internal/byte_buffer.hpp>
+#include <revisit/io/internal/mcap_format.hpp>
 #include <revisit/io/internal/text_writer.hpp>
 
 namespace revisit::io_internal {
 namespace {
 
-constexpr std::size_t kChunkBytes = 768 * 1024;
-constexpr std::string_view kMagic{"\x89MCAP0\r\n", 8};
-enum Op : std::uint8_t {
-  kHeader = 1,
-  kFooter,
-  kSchema,
-  kChannel,
-  kMessage,
-  kChunk,
-  kMessageIndex,
-  kChunkIndex,
-  kStatistics = 11,
-  kDataEnd = 15
-};
-
-std::string record(Op op, const std::string& content) {
+std::string mcap_record(mcap::Op op, const std::string& content) {
   ByteBuffer bytes;
   bytes.number(static_cast<std::uint8_t>(op)).number(std::uint64_t{content.size()}).raw(content);
   return bytes.bytes();
@@ -38,8 +24,8 @@ std::string record(Op op, const std::string& content) {
 class McapWriter final : public BagFileWriter {
  public:
   explicit McapWriter(const std::filesystem::path& file) : file_(file) {
-    put(kMagic);
-    put(record(kHeader, ByteBuffer().text("ros2").text("revisit").bytes()));
+    put(mcap::kMagic);
+    put(mcap_record(mcap::kHeader, ByteBuffer().text("ros2").text("revisit").bytes()));
   }
 
   Serialisation serialisation() const override { return Serialisation::kCdr; }
@@ -47,9 +33,10 @@ class McapWriter final : public BagFileWriter {
   Status add_topic(const std::string& name, const std::string& type) override {
     const auto id = static_cast<std::uint16_t>(counts_.size() + 1);
     const std::string full = type.substr(0, type.find('/')) + "/msg" + type.substr(type.find('/'));
-    std::string facts = record(
-        kSchema, ByteBuffer().number(id).text(full).text("ros2msg").text(definition_for_bag(type, false)).bytes());
-    facts += record(kChannel, ByteBuffer().number(id).number(id).text(name).text("cdr").text("").bytes());
+    std::string facts =
+        mcap_record(mcap::kSchema,
+                    ByteBuffer().number(id).text(full).text("ros2msg").text(definition_for_bag(type, false)).bytes());
+    facts += mcap_record(mcap::kChannel, ByteBuffer().number(id).number(id).text(name).text("cdr").text("").bytes());
     chunk_.raw(facts);  // with the messages, and in the summary again
     facts_ += facts;
     counts_.push_back(0);
@@ -63,21 +50,22 @@ class McapWriter final : public BagFileWriter {
     first_ = std::min(first_, time);
     last_ = std::max(last_, time);
     ByteBuffer head;
-    head.number(static_cast<std::uint8_t>(kMessage)).number(std::uint64_t{22 + message.size()}).number(channel);
+    head.number(static_cast<std::uint8_t>(mcap::kMessage)).number(std::uint64_t{22 + message.size()}).number(channel);
     head.number(static_cast<std::uint32_t>(counts_[topic]++)).number(time).number(time);
     chunk_.raw(head.bytes()).raw(message);
-    return chunk_.size() < kChunkBytes ? ok() : end_chunk();
+    return chunk_.size() < kBagChunkBytes ? ok() : end_chunk();
   }
 
   Status finish() override {
     if (const Status status = end_chunk(); !status) return status;
-    put(record(kDataEnd, ByteBuffer().number(std::uint32_t{0}).bytes()));
+    put(mcap_record(mcap::kDataEnd, ByteBuffer().number(std::uint32_t{0}).bytes()));
     const std::uint64_t summary = at_;
     put(facts_);
     put(chunk_indexes_);
     put(statistics());
-    put(record(kFooter, ByteBuffer().number(summary).number(std::uint64_t{0}).number(std::uint32_t{0}).bytes()));
-    put(kMagic);
+    put(mcap_record(mcap::kFooter,
+                    ByteBuffer().number(summary).number(std::uint64_t{0}).number(std::uint32_t{0}).bytes()));
+    put(mcap::kMagic);
     return file_.finish();
   }
 
@@ -97,17 +85,17 @@ class McapWriter final : public BagFileWriter {
     ByteBuffer chunk;
     chunk.number(first_).number(last_).number(std::uint64_t{chunk_.size()}).number(checksum).text("zstd");
     chunk.number(std::uint64_t{packed.size()}).raw(packed);
-    put(record(kChunk, chunk.bytes()));
+    put(mcap_record(mcap::kChunk, chunk.bytes()));
     const std::uint64_t end = at_;
     ByteBuffer offsets;
     for (const auto& [channel, rows] : index_) {
       offsets.number(channel).number(at_);
-      put(record(kMessageIndex, ByteBuffer().number(channel).text(rows.bytes()).bytes()));
+      put(mcap_record(mcap::kMessageIndex, ByteBuffer().number(channel).text(rows.bytes()).bytes()));
     }
     ByteBuffer index;
     index.number(first_).number(last_).number(begin).number(end - begin).text(offsets.bytes()).number(at_ - end);
     index.text("zstd").number(std::uint64_t{packed.size()}).number(std::uint64_t{chunk_.size()});
-    chunk_indexes_ += record(kChunkIndex, index.bytes());
+    chunk_indexes_ += mcap_record(mcap::kChunkIndex, index.bytes());
     ++chunks_;
     first_of_all_ = std::min(first_of_all_, first_);
     last_of_all_ = std::max(last_of_all_, last_);
@@ -131,7 +119,7 @@ class McapWriter final : public BagFileWriter {
         .number(static_cast<std::uint32_t>(counts_.size()));
     content.number(std::uint32_t{0}).number(std::uint32_t{0}).number(chunks_);
     content.number(messages > 0 ? first_of_all_ : 0).number(last_of_all_).text(by_channel.bytes());
-    return record(kStatistics, content.bytes());
+    return mcap_record(mcap::kStatistics, content.bytes());
   }
 
   TextWriter file_;

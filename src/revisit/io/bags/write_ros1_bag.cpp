@@ -8,24 +8,23 @@
 
 #include <revisit/io/internal/bag_file_writer.hpp>
 #include <revisit/io/internal/byte_buffer.hpp>
+#include <revisit/io/internal/ros1_format.hpp>
 #include <revisit/io/internal/text_writer.hpp>
 
 namespace revisit::io_internal {
 namespace {
 
-constexpr std::size_t kChunkBytes = 768 * 1024;  // rosbag's
-
 // Fields of a record's header.
-class Header {
+class RecordHeader {
  public:
   template <typename T>
-  Header& number(std::string_view name, T value) {
+  RecordHeader& number(std::string_view name, T value) {
     ByteBuffer field;
     field.raw(name).raw("=").number(value);
     bytes_.text(field.bytes());
     return *this;
   }
-  Header& text(std::string_view name, std::string_view value) {
+  RecordHeader& text(std::string_view name, std::string_view value) {
     bytes_.text(std::string(name) + "=" + std::string(value));
     return *this;
   }
@@ -47,12 +46,12 @@ class Ros1BagWriter final : public BagFileWriter {
   Serialisation serialisation() const override { return Serialisation::kRos1; }
 
   Status add_topic(const std::string& name, const std::string& type) override {
-    Header facts;
+    RecordHeader facts;
     facts.text("topic", name).text("type", type).text("md5sum", md5_of(type));
     facts.text("message_definition", definition_for_bag(type, true));
     ByteBuffer record;
-    record.text(Header()
-                    .number("op", std::uint8_t{7})
+    record.text(RecordHeader()
+                    .number("op", ros1::kConnection)
                     .number("conn", static_cast<std::uint32_t>(connections_.size()))
                     .text("topic", name)
                     .bytes());
@@ -70,13 +69,13 @@ class Ros1BagWriter final : public BagFileWriter {
     index_[topic].emplace_back(ros_time(time_ns), static_cast<std::uint32_t>(chunk_.size()));
     first_ns_ = std::min(first_ns_, time_ns);
     last_ns_ = std::max(last_ns_, time_ns);
-    chunk_.text(Header()
-                    .number("op", std::uint8_t{2})
+    chunk_.text(RecordHeader()
+                    .number("op", ros1::kMessage)
                     .number("conn", static_cast<std::uint32_t>(topic))
                     .number("time", ros_time(time_ns))
                     .bytes());
     chunk_.text(message);
-    return chunk_.size() < kChunkBytes ? ok() : end_chunk();
+    return chunk_.size() < kBagChunkBytes ? ok() : end_chunk();
   }
 
   Status finish() override {
@@ -99,15 +98,15 @@ class Ros1BagWriter final : public BagFileWriter {
   // Padded to 4096 bytes, so that it can be written again.
   void write_head(std::uint64_t index_at, std::uint32_t chunks) {
     constexpr std::size_t kHeadBytes = 4096;
-    const std::string header = Header()
-                                   .number("op", std::uint8_t{3})
+    const std::string header = RecordHeader()
+                                   .number("op", ros1::kBagHeader)
                                    .number("index_pos", index_at)
                                    .number("conn_count", static_cast<std::uint32_t>(connections_.size()))
                                    .number("chunk_count", chunks)
                                    .bytes();
     ByteBuffer record;
     record.text(header).text(std::string(kHeadBytes - 8 - header.size(), ' '));
-    put("#ROSBAG V2.0\n");
+    put(ros1::kMagic);
     put(record.bytes());
   }
 
@@ -116,16 +115,16 @@ class Ros1BagWriter final : public BagFileWriter {
     const std::string packed = compress(chunk_.bytes());
     const std::uint64_t begin = at_;
     ByteBuffer record;
-    record.text(Header()
-                    .number("op", std::uint8_t{5})
+    record.text(RecordHeader()
+                    .number("op", ros1::kChunk)
                     .text("compression", "lz4")
                     .number("size", static_cast<std::uint32_t>(chunk_.size()))
                     .bytes());
     record.text(packed);
     ByteBuffer counts;
     for (const auto& [topic, entries] : index_) {
-      record.text(Header()
-                      .number("op", std::uint8_t{4})
+      record.text(RecordHeader()
+                      .number("op", ros1::kIndex)
                       .number("ver", std::uint32_t{1})
                       .number("conn", static_cast<std::uint32_t>(topic))
                       .number("count", static_cast<std::uint32_t>(entries.size()))
@@ -137,8 +136,8 @@ class Ros1BagWriter final : public BagFileWriter {
     }
     put(record.bytes());
     ByteBuffer info;
-    info.text(Header()
-                  .number("op", std::uint8_t{6})
+    info.text(RecordHeader()
+                  .number("op", ros1::kChunkInfo)
                   .number("ver", std::uint32_t{1})
                   .number("chunk_pos", begin)
                   .number("start_time", ros_time(first_ns_))

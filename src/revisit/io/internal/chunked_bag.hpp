@@ -44,6 +44,8 @@ class ChunkedBag : public BagFile {
   /// The topic of a connection (ROS 1) or channel (.mcap), known from then on.
   void add_connection(std::uint32_t connection, BagTopic topic);
   std::optional<std::uint32_t> topic_of(std::uint32_t connection) const;
+  /// The index was no good.
+  void forget_index();
   /// The index is complete: chunks are put in the order of their times, and messages counted.
   void finish_index();
   /// Counts the messages of a chunk that no index speaks of. False where its data cannot be read.

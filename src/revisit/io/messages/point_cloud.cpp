@@ -13,11 +13,9 @@
 namespace revisit {
 namespace {
 
-using Field = PointCloudView::Field;
-
-const Field* find_field(const PointCloudView& cloud, std::initializer_list<std::string_view> names) {
+const PointCloudView::Field* find_field(const PointCloudView& cloud, std::initializer_list<std::string_view> names) {
   for (const std::string_view name : names)
-    for (const Field& field : cloud.fields) {
+    for (const PointCloudView::Field& field : cloud.fields) {
       std::string lower = field.name;
       std::transform(lower.begin(), lower.end(), lower.begin(),
                      [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -31,7 +29,7 @@ const Field* find_field(const PointCloudView& cloud, std::initializer_list<std::
 template <typename T>
 class Column {
  public:
-  Column(const Field* field, bool is_big_endian) : field_(field), is_big_endian_(is_big_endian) {}
+  Column(const PointCloudView::Field* field, bool is_big_endian) : field_(field), is_big_endian_(is_big_endian) {}
   explicit operator bool() const { return field_ != nullptr; }
 
   void copy(const std::uint8_t* records, std::size_t step, std::size_t count, T* target, std::size_t stride) const {
@@ -59,7 +57,7 @@ class Column {
       *target = static_cast<T>(io_internal::load_number<Stored>(at, true));
   }
 
-  const Field* field_;
+  const PointCloudView::Field* field_;
   bool is_big_endian_;
 };
 
@@ -71,7 +69,7 @@ Status check(const PointCloudView& cloud, const std::string& what) {
   if (cloud.width > kMost || cloud.height > kMost || cloud.point_step > kMost || cloud.row_step > kMost)
     return wrong("a cloud of " + std::to_string(cloud.width) + " x " + std::to_string(cloud.height) + " points");
   std::size_t record = 0;  // bytes of it that are used: the last one may lack its padding
-  for (const Field& field : cloud.fields) {
+  for (const PointCloudView::Field& field : cloud.fields) {
     if (field.type < 1 || field.type > kFieldBytes.size())
       return wrong("field '" + field.name + "' has type " + std::to_string(field.type) + "; allowed: 1 to 8");
     if (field.offset + kFieldBytes[field.type - 1u] > cloud.point_step)
@@ -99,12 +97,12 @@ struct Columns {
 };
 
 // A row of the cloud; `values` keeps rings and times of its points, with or without return.
-struct Row {
+struct CloudRow {
   std::vector<double> rings, times, times_ns;
 };
 
 void read_row(const std::uint8_t* records, std::size_t step, std::size_t count, const Columns& columns, Point* points,
-              Row& row) {
+              CloudRow& row) {
   constexpr std::size_t kStride = sizeof(Point) / sizeof(float);
   columns.x.copy(records, step, count, &points->x, kStride);
   columns.y.copy(records, step, count, &points->y, kStride);
@@ -124,8 +122,8 @@ void read_points(const PointCloudView& cloud, const Columns& columns, Scan& scan
   scan.points.resize(points);
   if (columns.ring) scan.rings.resize(points);
   if (columns.time) raw_times.resize(points);
-  Row row{std::vector<double>(columns.ring ? cloud.width : 0), std::vector<double>(columns.time ? cloud.width : 0),
-          std::vector<double>(columns.time_ns ? cloud.width : 0)};
+  CloudRow row{std::vector<double>(columns.ring ? cloud.width : 0), std::vector<double>(columns.time ? cloud.width : 0),
+               std::vector<double>(columns.time_ns ? cloud.width : 0)};
   std::size_t kept = 0;
   for (std::size_t i = 0; i < cloud.height; ++i) {
     // Where the row goes at first: what is kept of it moves up within itself.
@@ -159,14 +157,17 @@ Result<Scan> to_scan(const PointCloudView& cloud, const std::optional<double>& s
   PointTimes& found = times != nullptr ? *times : unused;
   found = {};
   if (const Status status = check(cloud, what); !status) return status.error();
-  const Field* position[3] = {find_field(cloud, {"x"}), find_field(cloud, {"y"}), find_field(cloud, {"z"})};
+  const PointCloudView::Field* position[3] = {find_field(cloud, {"x"}), find_field(cloud, {"y"}),
+                                              find_field(cloud, {"z"})};
   for (std::size_t i = 0; i < 3; ++i)
     if (position[i] == nullptr) return Error{what + ": no field '" + std::string(1, "xyz"[i]) + "'"};
-  const Field* intensity = find_field(
+  const PointCloudView::Field* intensity = find_field(
       cloud, {"intensity", "scalar_intensity", "reflectivity", "reflectance", "remission", "intensities", "i"});
-  const Field* ring = find_field(cloud, {"ring", "laser", "line", "channel", "laser_id", "scalar_ring"});
-  const Field* time = find_field(cloud, {"t", "time", "timestamp", "time_offset", "offset_time", "scalar_time"});
-  const Field* time_ns = nullptr;
+  const PointCloudView::Field* ring =
+      find_field(cloud, {"ring", "laser", "line", "channel", "laser_id", "scalar_ring"});
+  const PointCloudView::Field* time =
+      find_field(cloud, {"t", "time", "timestamp", "time_offset", "offset_time", "scalar_time"});
+  const PointCloudView::Field* time_ns = nullptr;
   if (time == nullptr) {  // seconds and nanoseconds apart
     time = find_field(cloud, {"time_sec", "timestamp_sec", "stamp_sec", "t_sec"});
     time_ns = find_field(cloud, {"time_nsec", "timestamp_nsec", "stamp_nsec", "t_nsec"});

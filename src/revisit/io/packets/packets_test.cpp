@@ -20,7 +20,7 @@ using testing_support::shared_data;
 
 fs::path packets() { return shared_data() / "recordings" / "packets"; }
 
-std::unique_ptr<Recording> open(const fs::path& file, const RecordingOptions& options = {}) {
+std::unique_ptr<Recording> open_packets(const fs::path& file, const RecordingOptions& options = {}) {
   auto recording = open_recording(file, {}, options);
   EXPECT_TRUE(recording) << recording.error().message;
   return recording ? *std::move(recording) : nullptr;
@@ -63,7 +63,7 @@ TEST(VelodynePackets, AgreeWithTheReferenceDecoder) {
   REVISIT_NEEDS_SHARED_DATA();
   for (const auto& [bag, truth, index] :
        {Decoded{"vlp16.db3", "vlp16_truth.pcd", 3}, {"vlp32.db3", "vlp32_truth.pcd", 0}}) {
-    const auto recording = open(packets() / bag);
+    const auto recording = open_packets(packets() / bag);
     ASSERT_TRUE(recording);
     const auto reference = read_scan(packets() / truth);
     ASSERT_TRUE(reference) << reference.error().message;
@@ -81,7 +81,7 @@ TEST(VelodynePackets, AgreeWithTheReferenceDecoder) {
 
 TEST(VelodynePackets, ScansAreCutAtAFixedAzimuth) {
   REVISIT_NEEDS_SHARED_DATA();
-  const auto recording = open(shared_data() / "formats/vlp16_50_frames.pcap");
+  const auto recording = open_packets(shared_data() / "formats/vlp16_50_frames.pcap");
   ASSERT_TRUE(recording);
   EXPECT_NEAR(static_cast<double>(recording->size()), 50, 1);
   EXPECT_NE(recording->findings()[0].find("VLP-16"), std::string::npos)
@@ -102,7 +102,7 @@ TEST(VelodynePackets, ScansAreCutAtAFixedAzimuth) {
 
 TEST(VelodynePackets, OthersOnTheWireArePassedOver) {
   REVISIT_NEEDS_SHARED_DATA();
-  const auto recording = open(packets() / "vlp16_with_position.pcap");
+  const auto recording = open_packets(packets() / "vlp16_with_position.pcap");
   ASSERT_TRUE(recording);
   EXPECT_EQ(recording->size(), 4u);
   const auto topics = list_topics(packets() / "vlp16_with_position.pcap");
@@ -116,7 +116,7 @@ TEST(VelodynePackets, OthersOnTheWireArePassedOver) {
 
 TEST(VelodynePackets, Hdl32) {
   REVISIT_NEEDS_SHARED_DATA();
-  const auto recording = open(shared_data() / "formats/hdl32.pcap");
+  const auto recording = open_packets(shared_data() / "formats/hdl32.pcap");
   ASSERT_TRUE(recording);
   ASSERT_EQ(recording->size(), 3u);
   const Scan scan = read(*recording, 1);
@@ -150,7 +150,7 @@ TEST(OusterPackets, EveryGenerationOfTheirFormat) {
         {"OS-1-128_767798045_1024x10_20230712_120049.pcap", 16373, 128, 4.f},
         {"OS-1-32-G_v2.1.1_1024x10.pcap", 27310, 32, 205.f},
         {"../../formats/ouster_packets_ros1.bag", 28751, 128, 12.f}}) {
-    const auto recording = open(packets() / file);
+    const auto recording = open_packets(packets() / file);
     ASSERT_TRUE(recording);
     ASSERT_EQ(recording->size(), 1u) << file;
     const Scan scan = read(*recording, 0);
@@ -184,7 +184,7 @@ TEST(OusterPackets, TwoSensorsOnOnePortInFragments) {
   EXPECT_NE(both.error().message.find("169.254.92.158"), std::string::npos);
   for (const auto& [sender, sensor, points] :
        {std::tuple{"169.254.92.158", "OS-0-128", 1964u}, {"169.254.238.111", "OS-1-64", 985u}}) {
-    const auto recording = open(file, {.topic = sender});
+    const auto recording = open_packets(file, {.topic = sender});
     ASSERT_TRUE(recording);
     EXPECT_NE(recording->findings()[0].find(sensor), std::string::npos);
     EXPECT_EQ(read(*recording, 0).points.size(), points);
@@ -194,7 +194,7 @@ TEST(OusterPackets, TwoSensorsOnOnePortInFragments) {
 TEST(OusterPackets, TheLastOfTwoReturnsLiesBehindTheStrongest) {
   REVISIT_NEEDS_SHARED_DATA();
   const fs::path file = packets() / "OS-0-32-U1_v2.2.0_1024x10.pcap";
-  const Scan strongest = read(*open(file), 0), last = read(*open(file, {.last_return = true}), 0);
+  const Scan strongest = read(*open_packets(file), 0), last = read(*open_packets(file, {.last_return = true}), 0);
   const auto sum = [](const Scan& scan) {
     double metres = 0.0;
     for (const Point& p : scan.points) metres += std::hypot(p.x, p.y, p.z);
