@@ -3,6 +3,7 @@
 #include <cmath>
 #include <fstream>
 
+#include <revisit/io/bag_writer.hpp>
 #include <revisit/io/recording.hpp>
 
 #include "run_program.hpp"
@@ -88,6 +89,24 @@ TEST(SimulateCli, InfoListsTheTopicsOfABagAndWhatItFound) {
   const auto wrong = run("detect " + bag.string() + " --topic /none --out " + (bag.parent_path() / "r").string());
   EXPECT_EQ(wrong.code, 1);
   EXPECT_NE(wrong.output.find("no topic '/none' of scans; there are: /points"), std::string::npos) << wrong.output;
+}
+
+TEST(SimulateCli, GapsAndDuplicatesOfABagAreToldAndSurvived) {
+  const fs::path folder = fresh_folder();
+  ASSERT_EQ(run("simulate --out " + (folder / "drive").string() + " --sensor vlp16 --length_m 50 --frames 12").code, 0);
+  const auto drive = open_recording(folder / "drive");
+  ASSERT_TRUE(drive);
+  auto writer = BagWriter::create(folder / "odd.bag");
+  ASSERT_TRUE(writer);
+  for (const std::size_t i : {0u, 1u, 2u, 3u, 3u, 4u, 7u, 8u, 9u, 10u, 11u})
+    ASSERT_TRUE(writer->write_scan("/points", "lidar", *(*drive)->read(i)));
+  ASSERT_TRUE(writer->finish());
+  const auto told = run("info " + (folder / "odd.bag").string());
+  EXPECT_NE(told.output.find("1 among the first 11 scans, the longest 0.30 s"), std::string::npos) << told.output;
+  EXPECT_NE(told.output.find("1 of the first 11 are not after the one before"), std::string::npos) << told.output;
+  const auto slam = run("slam " + (folder / "odd.bag").string() + " --no-map --out " + (folder / "map").string());
+  EXPECT_NE(slam.output.find("11 scans, "), std::string::npos) << slam.output;
+  EXPECT_NE(slam.output.find("its stamp is not after that of the scan before"), std::string::npos) << slam.output;
 }
 
 TEST(SimulateCli, WrongNamesAreErrorsThatTellTheRightOnes) {

@@ -147,9 +147,9 @@ std::string definition_for_bag(const std::string& type, bool is_ros1) {
     std::string line = text.substr(begin, end - begin);
     begin = end + 1;
     if (line.starts_with("MSG: ")) result += std::string(80, '=') + "\n";
-    if (!is_ros1 && line.starts_with("Header ")) line = "std_msgs/" + line;
-    if (!is_ros1 && line.starts_with("time ")) line = "builtin_interfaces/T" + line.substr(1);
-    result += line + "\n";
+    if (!is_ros1 && line.starts_with("Header ")) line.insert(0, "std_msgs/");
+    if (!is_ros1 && line.starts_with("time ")) line.replace(0, 1, "builtin_interfaces/T");
+    result.append(line).append("\n");
   }
   return result;
 }

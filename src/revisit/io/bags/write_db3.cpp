@@ -54,7 +54,7 @@ class Db3Writer final : public BagFileWriter {
 
   Status write(std::size_t topic, std::int64_t log_time_ns, const std::string& message) override {
     sqlite3_reset(insert_);
-    sqlite3_bind_int64(insert_, 1, static_cast<sqlite3_int64>(topic + 1));
+    sqlite3_bind_int64(insert_, 1, static_cast<sqlite3_int64>(topic) + 1);
     sqlite3_bind_int64(insert_, 2, log_time_ns);
     sqlite3_bind_blob64(insert_, 3, message.data(), message.size(), SQLITE_STATIC);
     if (sqlite3_step(insert_) != SQLITE_DONE) return error();

@@ -10,7 +10,7 @@
 
 namespace revisit::io_internal {
 
-constexpr std::size_t kBagChunkBytes = 768 * 1024;  ///< before compression, as ROS writes them
+constexpr std::size_t kBagChunkBytes = std::size_t{768} * 1024;  ///< before compression, as ROS writes them
 
 /// Writes messages into one file of a format. In memory is the chunk that is being filled, and the index.
 class BagFileWriter {

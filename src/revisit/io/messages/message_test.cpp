@@ -107,6 +107,25 @@ TEST(MessageValues, ImuAndOdometryOfRos2) {
   EXPECT_TRUE(b->number("twist.covariance", 35).has_value());
 }
 
+TEST(MessageValues, ACloudAsRclcppSerialisesIt) {
+  REVISIT_NEEDS_SHARED_DATA();
+  const std::string bytes = read_cdr("cloud0.cdr");
+  const auto cloud =
+      MessageValues::decode(parse("sensor_msgs/PointCloud2", known_definition("sensor_msgs/PointCloud2", false)),
+                            Serialisation::kCdr, span_of(bytes));
+  ASSERT_TRUE(cloud) << cloud.error().message;
+  EXPECT_EQ(cloud->integer("width"), 200);
+  EXPECT_EQ(cloud->integer("height"), 16);
+  EXPECT_EQ(cloud->text("fields[0].name"), "x");
+  EXPECT_EQ(cloud->block("data").size(), static_cast<std::size_t>(*cloud->integer("row_step") * 16));
+  const auto bag = Bag::open(shared_data() / "recordings/generated/ros2_pointcloud2.db3", {});
+  ASSERT_TRUE(bag) << bag.error().message;
+  const auto message = (*bag)->read(0, 0);
+  ASSERT_TRUE(message);
+  EXPECT_TRUE(
+      std::equal(message->data.bytes.begin(), message->data.bytes.end(), span_of(bytes).begin(), span_of(bytes).end()));
+}
+
 TEST(MessageValues, MessagesInAnArrayLieEvenlyApart) {
   const auto definition = parse("l/CustomMsg",
                                 "uint32 point_num\nCustomPoint[] points\nuint8 end\n"

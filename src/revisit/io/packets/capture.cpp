@@ -46,12 +46,12 @@ struct IpHead {
 };
 IpHead parse_ip(ByteSpan ip) {
   IpHead head;
-  const std::size_t size = 4u * (ip[0] & 15u);
+  const std::size_t size = std::size_t{4} * (ip[0] & 15u);
   if (size < 20 || size > ip.size()) return head;
   const std::uint16_t flags = be16(ip.data() + 6);
   head.from = load_number<std::uint32_t>(ip.data() + 12, true);
   head.id = be16(ip.data() + 4);
-  head.fragment_at = 8u * (flags & 0x1FFFu);
+  head.fragment_at = std::size_t{8} * (flags & 0x1FFFu);
   head.has_more = (flags & 0x2000) != 0;
   head.is_udp = ip[9] == 17;
   head.body = ip.subspan(size);
@@ -233,6 +233,7 @@ Result<std::vector<CapturedStream>> open_capture(const std::filesystem::path& fi
   if (!status) return status.error();
   if (by_key.empty()) return Error{file.string() + ": holds no UDP packet over IPv4"};
   std::vector<CapturedStream> streams;
+  streams.reserve(by_key.size());
   for (auto& [key, stream] : by_key)
     streams.push_back({name_of(key), std::get<2>(key), std::move(stream.first),
                        std::make_shared<CapturedPackets>(capture, key, std::move(stream.places))});

@@ -32,7 +32,10 @@ struct Model {
   bool turns_each_laser, last_block_stands;
   std::array<float, kReturns> elevation_deg, azimuth_deg;
 
-  constexpr double block_us() const { return firing_us * static_cast<double>(kReturns / rings); }
+  constexpr double block_us() const {
+    const std::size_t firings = kReturns / rings;
+    return firing_us * static_cast<double>(firings);
+  }
 };
 
 constexpr std::array<float, kReturns> kNone{};
@@ -150,9 +153,9 @@ class VelodyneDecoder final : public PacketDecoder {
       ++points.scan.dropped_at_origin;
       return;
     }
-    const std::size_t laser = i % model_.rings;
+    const std::size_t laser = i % model_.rings, fires_after = laser / model_.at_once;
     const double after_us =
-        model_.laser_us * static_cast<double>(laser / model_.at_once) + (i >= model_.rings ? model_.firing_us : 0.0);
+        model_.laser_us * static_cast<double>(fires_after) + (i >= model_.rings ? model_.firing_us : 0.0);
     const double turns_for_us = model_.turns_each_laser ? model_.laser_us * static_cast<double>(laser) : after_us;
     // To the hundredth of a degree, in which blocks count.
     const double turned = std::round(azimuth(payload, part) + turn * turns_for_us / part_us());
