@@ -34,7 +34,9 @@ class BagWriter {
   Status write_imu(const std::string& topic, const std::string& frame_id, double stamp_s, const ImuSample& sample);
   Status write_odometry(const std::string& topic, const std::string& frame_id, const std::string& child_frame_id,
                         double stamp_s, const Pose& T_frame_child);
-  Status write_static_transform(const std::string& parent, const std::string& child, const Pose& T_parent_child);
+  /// Recorded at `stamp_s`, before the first scan.
+  Status write_static_transform(const std::string& parent, const std::string& child, double stamp_s,
+                                const Pose& T_parent_child);
   /// Writes the index; without it the file is one that was cut off.
   Status finish();
 

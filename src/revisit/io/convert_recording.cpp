@@ -28,7 +28,8 @@ class BagTarget final : public Target {
 
   Status add(const Scan& scan, const std::optional<Pose>& T_wheels_lidar) override {
     if (!std::exchange(has_frames_, true))
-      if (const Status status = writer_.write_static_transform("base_link", kLidar, Pose::Identity()); !status)
+      if (const Status status = writer_.write_static_transform("base_link", kLidar, scan.stamp_s, Pose::Identity());
+          !status)
         return status;
     // Readings come with two scans: with the one during which they were taken, and with the next.
     for (const ImuSample& sample : scan.imu)
@@ -120,10 +121,16 @@ Result<Converted> convert_recording(const Recording& recording, const fs::path& 
   auto target = make_target(out);
   if (!target) return target.error();
   Converted converted;
+  bool loses_imu = !is_bag_name(out);
   Status problem = ok();
   for (std::size_t i = 0; i < recording.size(); ++i) {
     const auto scan = recording.read(i);
     if (scan) {
+      if (loses_imu && (!scan->imu.empty() || scan->up)) {
+        log_to(log, LogLevel::kWarning,
+               out.string() + ": KITTI folders hold neither an IMU nor how the sensor is mounted: left out");
+        loses_imu = false;
+      }
       problem = (*target)->add(*scan, recording.wheel_pose(i));
       if (!problem) break;
       ++converted.scans;

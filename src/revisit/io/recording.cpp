@@ -277,8 +277,9 @@ Result<std::unique_ptr<Recording>> open_folder(const fs::path& folder, const Log
 
 }  // namespace
 
-Result<std::unique_ptr<Recording>> open_recording(const fs::path& path, const LogSink& log,
-                                                  const RecordingOptions& options) {
+namespace {
+
+Result<std::unique_ptr<Recording>> open_any(const fs::path& path, const LogSink& log, const RecordingOptions& options) {
   std::error_code failure;
   const fs::file_status status = fs::status(path, failure);
   if (status.type() == fs::file_type::not_found) return Error{path.string() + ": no such file or folder"};
@@ -290,6 +291,17 @@ Result<std::unique_ptr<Recording>> open_recording(const fs::path& path, const Lo
     return Error{path.string() + ": is no recording: neither a folder of scans nor a bag (.bag, .mcap, .db3) nor a " +
                  "packet capture (.pcap)"};
   return open_folder(path, log, options);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Recording>> open_recording(const fs::path& path, const LogSink& log,
+                                                  const RecordingOptions& options) {
+  try {
+    return open_any(path, log, options);
+  } catch (const std::exception& problem) {  // no memory, or what the readers underneath throw on broken files
+    return Error{path.string() + ": cannot be read: " + problem.what()};
+  }
 }
 
 Result<Pose> read_camera_calibration(const fs::path& file) { return io_internal::read_kitti_calibration(file, "Tr"); }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <cstdlib>
 #include <limits>
 #include <set>
 
@@ -88,10 +89,11 @@ bool are_one_recording(const std::vector<fs::path>& files) {
 }
 
 Result<std::vector<fs::path>> files_of(const fs::path& path, const LogSink& log) {
-  if (!fs::is_directory(path)) return std::vector{path};
+  std::error_code failure;
+  if (!fs::is_directory(path, failure)) return std::vector{path};
   std::vector<fs::path> named = files_in_metadata(path);
   const std::size_t declared = named.size();
-  std::erase_if(named, [](const fs::path& file) { return !fs::exists(file) || format_of(file).empty(); });
+  std::erase_if(named, [&](const fs::path& file) { return !fs::exists(file, failure) || format_of(file).empty(); });
   if (named.size() < declared)
     log_to(log, LogLevel::kWarning,
            (path / "metadata.yaml").string() + ": " + std::to_string(declared - named.size()) + " of " +
@@ -135,8 +137,11 @@ Status Bag::add(const fs::path& file, const LogSink& log) {
     const auto packed = RandomAccessFile::open(file);
     if (!packed) return packed.error();
     std::error_code failure;
-    plain = fs::temp_directory_path(failure) / ("revisit-" + std::to_string(::getpid()) + "-" +
-                                                std::to_string(temporary_.size()) + "-" + file.stem().string());
+    std::string name = (fs::temp_directory_path(failure) / "revisit-XXXXXX").string() + format_of(file);
+    const int descriptor = ::mkstemps(name.data(), static_cast<int>(format_of(file).size()));
+    if (descriptor < 0) return Error{name + ": cannot be made: " + system_reason()};
+    ::close(descriptor);
+    plain = name;
     temporary_.push_back(plain);
     log_to(log, LogLevel::kInfo, file.string() + ": is decompressed to " + plain.string() + " first");
     if (const Status status = decompress_zstd_file(*packed, plain); !status) return status;
@@ -160,7 +165,12 @@ void Bag::finish() {
     for (std::size_t i = 0; i < file.bag->topics().size(); ++i) {
       const BagTopic& topic = file.bag->topics()[i];
       const std::string type = short_type(topic.type);
+      // One file may hold two of the same name and type: they stay apart.
+      const auto is_taken = [&](std::size_t number) {
+        return number < file.topic_here.size() && file.topic_here[number].has_value();
+      };
       const auto found = std::find_if(topics_.begin(), topics_.end(), [&](const BagTopic& other) {
+        if (is_taken(static_cast<std::size_t>(&other - topics_.data()))) return false;
         return other.name == topic.name && other.type == type && other.encoding == topic.encoding;
       });
       const auto number = static_cast<std::size_t>(found - topics_.begin());

@@ -46,7 +46,8 @@ class BagRecording final : public Recording {
     if (!stamp || !log_time) return std::nullopt;
     constexpr double kAround_s = 0.5;
     PoseFile poses{PoseFormat::kTum, 0, {}};
-    visit(*choice_.odometry, *log_time - kAround_s, *log_time + kAround_s, [&](const MessageValues& values) {
+    const auto [from_s, to_s] = recorded_between(*log_time, *stamp);
+    visit(*choice_.odometry, from_s - kAround_s, to_s + kAround_s, [&](const MessageValues& values) {
       if (const auto T = pose_at(values, "pose.pose.position", "pose.pose.orientation"))
         poses.rows.push_back({std::nullopt, to_seconds(values.stamp_ns()), *T * choice_.T_base_lidar});
     });
@@ -63,6 +64,13 @@ class BagRecording final : public Recording {
   }
 
  private:
+  // Other messages of that moment were recorded when they came, the scan perhaps only after it was filtered.
+  static std::pair<double, double> recorded_between(double log_time_s, double stamp_s) {
+    constexpr double kSameClock_s = 10.0;
+    if (std::abs(log_time_s - stamp_s) > kSameClock_s) return {log_time_s, log_time_s};
+    return {std::min(log_time_s, stamp_s), std::max(log_time_s, stamp_s)};
+  }
+
   // Messages that cannot be read are left out: they only help.
   void visit(std::size_t topic, double from_s, double to_s,
              const std::function<void(const MessageValues&)>& use) const {
@@ -81,7 +89,8 @@ class BagRecording final : public Recording {
     const double from_s = (scan.times_s.empty() ? 0.0 : static_cast<double>(*first)) - kBefore_s;
     const double to_s = scan.times_s.empty() ? 0.1 : static_cast<double>(*last);
     const Eigen::Matrix3f R = choice_.R_lidar_imu.cast<float>();
-    visit(*choice_.imu, *log_time + from_s - kLateness_s, *log_time + to_s + kLateness_s,
+    const auto [earliest_s, latest_s] = recorded_between(*log_time, scan.stamp_s);
+    visit(*choice_.imu, earliest_s + from_s - kLateness_s, latest_s + to_s + kLateness_s,
           [&](const MessageValues& values) {
             const auto vector = [&](const std::string& path) {
               return Eigen::Vector3f(static_cast<float>(values.number(path + ".x").value_or(0.0)),

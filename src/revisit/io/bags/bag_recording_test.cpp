@@ -179,8 +179,8 @@ TEST(BagRecording, OdometryComesWithTheTransformToTheLidar) {
   Pose T_base_lidar = moved(1.0, kPi / 2);
   auto writer = BagWriter::create(file);
   ASSERT_TRUE(writer);
-  ASSERT_TRUE(writer->write_static_transform("base_link", "mast", Pose::Identity()));
-  ASSERT_TRUE(writer->write_static_transform("mast", "lidar", T_base_lidar));
+  ASSERT_TRUE(writer->write_static_transform("base_link", "mast", 1.0, Pose::Identity()));
+  ASSERT_TRUE(writer->write_static_transform("mast", "lidar", 1.0, T_base_lidar));
   for (int i = 0; i < 20; ++i) {
     ASSERT_TRUE(writer->write_odometry("/odom", "odom", "base_link", 1'600'000'000 + 0.05 * i, moved(0.1 * i, 0.0)));
     if (i % 2 != 0) continue;
@@ -221,7 +221,7 @@ TEST(BagRecording, ImuComesInTheFrameOfTheLidarAndAroundTheSweep) {
     ASSERT_TRUE(writer);
     Pose T_lidar_imu = Pose::Identity();  // upside down
     T_lidar_imu.linear() = Eigen::AngleAxisd(kPi, Eigen::Vector3d::UnitX()).toRotationMatrix();
-    ASSERT_TRUE(writer->write_static_transform("lidar", "imu", T_lidar_imu));
+    ASSERT_TRUE(writer->write_static_transform("lidar", "imu", 1.0, T_lidar_imu));
     for (int i = 0; i < 100; ++i) {
       ASSERT_TRUE(
           writer->write_imu("/imu", "imu", 1'600'000'000 + 0.01 * i, {0.0, {0.1f, 0.2f, 0.3f}, {0.f, 0.f, -9.8f}}));
@@ -248,7 +248,7 @@ TEST(BagRecording, AMountingUpsideDownIsKnownFromTransforms) {
   ASSERT_TRUE(writer);
   Pose T_base_lidar = Pose::Identity();
   T_base_lidar.linear() = Eigen::AngleAxisd(kPi, Eigen::Vector3d::UnitX()).toRotationMatrix();
-  ASSERT_TRUE(writer->write_static_transform("base_link", "lidar", T_base_lidar));
+  ASSERT_TRUE(writer->write_static_transform("base_link", "lidar", 1.0, T_base_lidar));
   ASSERT_TRUE(writer->write_scan("/points", "lidar", scan_at(0)));
   ASSERT_TRUE(writer->finish());
   const auto opened = open(file);

@@ -10,7 +10,9 @@
 
 #include <revisit/core/text.hpp>
 #include <revisit/io/bag_writer.hpp>
+#include <revisit/io/internal/bag_file_writer.hpp>
 #include <revisit/io/internal/bytes.hpp>
+#include <revisit/io/internal/decompress.hpp>
 
 #include "run_program.hpp"
 #include "shared_data.hpp"
@@ -187,6 +189,33 @@ TEST(Bag, WholeFileCompressed) {
   EXPECT_EQ(messages_of(*packed.bag, 0), messages_of(*plain.bag, 0));
 }
 
+TEST(Bag, AFrameThatEndsWithABlockIsWhole) {
+  const fs::path folder = fresh_folder();
+  const std::string bytes(3 * 128 * 1024, 'x');  // of zstd's blocks
+  std::string packed(ZSTD_compressBound(bytes.size()), '\0');
+  packed.resize(ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), 1));
+  std::ofstream(folder / "packed", std::ios::binary) << packed;
+  const auto file = RandomAccessFile::open(folder / "packed");
+  ASSERT_TRUE(file);
+  const Status status = decompress_zstd_file(*file, folder / "plain");
+  ASSERT_TRUE(status) << status.error().message;
+  EXPECT_EQ(*read_bytes(folder / "plain"), bytes);
+}
+
+TEST(Bag, TwoTopicsOfOneNameAndTypeStayApart) {
+  const fs::path file = fresh_folder() / "twice.db3";
+  auto writer = create_db3(file);
+  ASSERT_TRUE(writer);
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE((*writer)->add_topic("/text", "std_msgs/String"));
+  for (const std::size_t number : {0u, 1u, 1u}) ASSERT_TRUE((*writer)->write(number, 1, "1234"));
+  ASSERT_TRUE((*writer)->finish());
+  const auto opened = open(file);
+  ASSERT_TRUE(opened.bag) << opened.error;
+  ASSERT_EQ(opened.bag->topics().size(), 2u);
+  EXPECT_EQ(messages_of(*opened.bag, 0).size(), 1u);
+  EXPECT_EQ(messages_of(*opened.bag, 1).size(), 2u);
+}
+
 struct Conformance {
   const char* file;
   std::size_t topics, messages;
@@ -298,7 +327,7 @@ std::vector<std::string> list_by(const std::string& program, const fs::path& fil
 void write_drive(const fs::path& file) {
   auto writer = BagWriter::create(file);
   ASSERT_TRUE(writer) << writer.error().message;
-  ASSERT_TRUE(writer->write_static_transform("base_link", "lidar", Pose::Identity()));
+  ASSERT_TRUE(writer->write_static_transform("base_link", "lidar", 1.0, Pose::Identity()));
   Scan scan;
   for (int i = 0; i < 20'000; ++i) {
     scan.points.push_back({static_cast<float>(i), 1.f, 2.f, 3.f});

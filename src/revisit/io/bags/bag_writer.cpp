@@ -123,15 +123,15 @@ Status BagWriter::write_odometry(const std::string& topic, const std::string& fr
   return write(topic, "nav_msgs/Odometry", to_nanoseconds(stamp_s), message.bytes());
 }
 
-Status BagWriter::write_static_transform(const std::string& parent, const std::string& child,
+Status BagWriter::write_static_transform(const std::string& parent, const std::string& child, double stamp_s,
                                          const Pose& T_parent_child) {
   MessageWriter message(file_->serialisation());
   message.number(std::uint32_t{1});
-  message.header(0, parent);
+  message.header(to_nanoseconds(stamp_s), parent);
   message.text(child);
   write_vector(message, T_parent_child.translation());
   write_rotation(message, T_parent_child);
-  return write("/tf_static", "tf2_msgs/TFMessage", 0, message.bytes());
+  return write("/tf_static", "tf2_msgs/TFMessage", to_nanoseconds(stamp_s), message.bytes());
 }
 
 Status BagWriter::finish() { return file_->finish(); }

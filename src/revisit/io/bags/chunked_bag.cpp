@@ -59,7 +59,7 @@ void ChunkedBag::finish_index() {
 }
 
 Result<std::shared_ptr<const ChunkedBag::Loaded>> ChunkedBag::loaded(std::size_t chunk) const {
-  constexpr std::size_t kKept = 4;  // one for clouds, and its neighbours for what belongs to their time
+  constexpr std::size_t kKeptBytes = 64 << 20;  // what odometry and an IMU need around a cloud
   {
     const std::lock_guard lock(mutex_);
     for (auto it = recent_.begin(); it != recent_.end(); ++it)
@@ -78,7 +78,11 @@ Result<std::shared_ptr<const ChunkedBag::Loaded>> ChunkedBag::loaded(std::size_t
   auto made = std::make_shared<const Loaded>(Loaded{*std::move(bytes), *std::move(messages)});
   const std::lock_guard lock(mutex_);
   recent_.emplace_front(chunk, made);
-  if (recent_.size() > kKept) recent_.pop_back();
+  recent_bytes_ += made->bytes.bytes.size();
+  while (recent_bytes_ > kKeptBytes && recent_.size() > 1) {
+    recent_bytes_ -= recent_.back().second->bytes.bytes.size();
+    recent_.pop_back();
+  }
   return made;
 }
 

@@ -41,6 +41,7 @@ class Db3File final : public BagFile {
                                      SQLITE_OPEN_READONLY | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX, nullptr);
     database_.reset(raw);
     if (code != SQLITE_OK) return error("cannot be opened");
+    if (const Status status = check_tables(); !status) return status;
     if (const Status status = read_topics(); !status) return status;
     return read_rows(log);
   }
@@ -60,6 +61,8 @@ class Db3File final : public BagFile {
     const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement->get(), 0));
     std::uint8_t* target = nullptr;
     BagMessage message{row.time_ns, allocate(size, target)};
+    if (target == nullptr)
+      return Error{path_.string() + ": no memory for a message of " + std::to_string(size) + " bytes"};
     if (size > 0) std::copy_n(static_cast<const std::uint8_t*>(sqlite3_column_blob(statement->get(), 0)), size, target);
     return message;
   }
@@ -93,6 +96,16 @@ class Db3File final : public BagFile {
     return Statement(raw);
   }
 
+  // Tables, not views: those may be without end.
+  Status check_tables() {
+    auto statement =
+        prepare("SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name IN ('messages', 'topics')");
+    if (!statement) return statement.error();
+    if (sqlite3_step(statement->get()) != SQLITE_ROW || sqlite3_column_int(statement->get(), 0) != 2)
+      return Error{path_.string() + ": is no bag of ROS 2 (.db3): no tables 'messages' and 'topics'"};
+    return ok();
+  }
+
   Status read_topics() {
     std::map<std::string, std::string> definitions;  // only newer bags have them
     if (auto statement = prepare("SELECT topic_type, encoded_message_definition FROM message_definitions WHERE "
@@ -120,7 +133,9 @@ class Db3File final : public BagFile {
     for (; (code = sqlite3_step(statement->get())) == SQLITE_ROW; ++count) {
       const auto topic = topic_of_id_.find(sqlite3_column_int64(statement->get(), 1));
       if (topic == topic_of_id_.end()) continue;
-      const Row row{sqlite3_column_int64(statement->get(), 2), sqlite3_column_int64(statement->get(), 0)};
+      constexpr std::int64_t kFarthest_ns = std::int64_t{1} << 61;  // some 73 years either way
+      const std::int64_t time_ns = sqlite3_column_int64(statement->get(), 2);
+      const Row row{std::clamp(time_ns, -kFarthest_ns, kFarthest_ns), sqlite3_column_int64(statement->get(), 0)};
       rows_[topic->second].push_back(row);
       first_ns_ = count == 0 ? row.time_ns : std::min(first_ns_, row.time_ns);
       last_ns_ = count == 0 ? row.time_ns : std::max(last_ns_, row.time_ns);

@@ -16,11 +16,14 @@ std::string wrong_size(std::uint64_t found, std::uint64_t said) {
   return "decompressed to " + std::to_string(found) + " bytes instead of " + std::to_string(said);
 }
 
+Error no_memory(std::uint64_t size) { return {"no memory for " + std::to_string(size) + " bytes"}; }
+
 Result<SharedBytes> decompress_lz4(const SharedBytes& data, std::uint64_t size) {
   // A byte of LZ4 stands for 255 at most: a size that lies is noticed before memory is asked for.
   if (size > 256 * data.bytes.size() + 64) return Error{wrong_size(0, size)};
   std::uint8_t* target = nullptr;
   SharedBytes result = allocate(size, target);
+  if (target == nullptr) return no_memory(size);
   LZ4F_dctx* raw = nullptr;
   if (LZ4F_isError(LZ4F_createDecompressionContext(&raw, LZ4F_VERSION))) return Error{"lz4: no memory"};
   const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> context(raw,
@@ -42,6 +45,7 @@ Result<SharedBytes> decompress_bz2(const SharedBytes& data, std::uint64_t size) 
   if (data.bytes.size() > std::numeric_limits<unsigned>::max()) return Error{"bz2: too large"};
   std::uint8_t* target = nullptr;
   SharedBytes result = allocate(size, target);
+  if (target == nullptr) return no_memory(size);
   auto written = static_cast<unsigned>(size);
   // bzip2 declares its input as changeable, and leaves it as it is.
   char* source = reinterpret_cast<char*>(const_cast<std::uint8_t*>(data.bytes.data()));
@@ -55,6 +59,7 @@ Result<SharedBytes> decompress_bz2(const SharedBytes& data, std::uint64_t size) 
 Result<SharedBytes> decompress_zstd(const SharedBytes& data, std::uint64_t size) {
   std::uint8_t* target = nullptr;
   SharedBytes result = allocate(size, target);
+  if (target == nullptr) return no_memory(size);
   const std::size_t written = ZSTD_decompress(target, size, data.bytes.data(), data.bytes.size());
   if (ZSTD_isError(written)) return Error{std::string("zstd: ") + ZSTD_getErrorName(written)};
   if (written != size) return Error{"zstd: " + wrong_size(written, size)};
@@ -100,7 +105,7 @@ Status decompress_zstd_file(const RandomAccessFile& file, const std::filesystem:
       if (ZSTD_isError(hint)) return file.error(offset, std::string("zstd: ") + ZSTD_getErrorName(hint));
       if (!out.write(room.data(), static_cast<std::streamsize>(produced.pos)))
         return Error{target.string() + ": cannot be written: no space left?"};
-    } while (in.pos < in.size || produced.pos == produced.size);
+    } while (in.pos < in.size || (hint != 0 && produced.pos == produced.size));
   }
   if (hint != 0) return file.error(file.size(), "zstd: the data end within a frame");
   return ok();

@@ -13,9 +13,7 @@
 namespace revisit::io_internal {
 namespace {
 
-std::int64_t to_ns(std::uint64_t time) {
-  return static_cast<std::int64_t>(std::min<std::uint64_t>(time, std::numeric_limits<std::int64_t>::max()));
-}
+std::int64_t to_ns(std::uint64_t time) { return static_cast<std::int64_t>(std::min(time, std::uint64_t{1} << 61)); }
 
 class McapFile final : public ChunkedBag {
  public:
@@ -62,7 +60,7 @@ class McapFile final : public ChunkedBag {
                     [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; }))
       return false;
     const auto start = load_number<std::uint64_t>(footer->bytes.data() + mcap::kRecordHead);
-    if (start == 0 || start >= footer_at) return false;
+    if (start == 0 || start >= footer_at || footer_at - start > kLargestPiece) return false;
     const auto summary = file_.read(start, footer_at - start);
     if (!summary) return false;
     std::optional<std::uint64_t> expected;

@@ -39,7 +39,8 @@ PointCloudView view_of_livox(const MessageValues& message) {
   view.is_big_endian = message.is_big_endian();
   std::size_t begin = message.bytes().size(), end = 0;
   for (const char* name : {"x", "y", "z", "reflectivity", "line", "offset_time"})
-    if (const auto* value = message.find("points." + std::string(name))) {
+    if (const auto* value = message.find("points." + std::string(name));
+        value != nullptr && size_of(value->primitive) > 0) {
       begin = std::min(begin, value->offset);
       end = std::max(end, value->offset + size_of(value->primitive));
       view.point_step = value->stride;
@@ -47,7 +48,8 @@ PointCloudView view_of_livox(const MessageValues& message) {
   if (begin >= end) return view;
   if (view.width == 1) view.point_step = end - begin;
   for (const char* name : {"x", "y", "z", "reflectivity", "line", "offset_time"})
-    if (const auto* value = message.find("points." + std::string(name)))
+    if (const auto* value = message.find("points." + std::string(name));
+        value != nullptr && size_of(value->primitive) > 0)
       view.fields.push_back({name, static_cast<std::uint32_t>(value->offset - begin),
                              kTypes[static_cast<std::size_t>(value->primitive)]});
   // The last record may end before its padding does.

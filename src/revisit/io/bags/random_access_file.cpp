@@ -2,6 +2,7 @@
 #include <revisit/io/internal/random_access_file.hpp>
 
 #include <cerrno>
+#include <new>
 #include <utility>
 
 #include <fcntl.h>
@@ -13,9 +14,9 @@
 namespace revisit::io_internal {
 
 SharedBytes allocate(std::size_t size, std::uint8_t*& writable) {
-  std::shared_ptr<std::uint8_t[]> owner(new std::uint8_t[size]);  // not set to zero
+  std::shared_ptr<std::uint8_t[]> owner(new (std::nothrow) std::uint8_t[size]);  // not set to zero
   writable = owner.get();
-  return {owner, {owner.get(), size}};
+  return {owner, {owner.get(), owner ? size : 0}};
 }
 
 Result<RandomAccessFile> RandomAccessFile::open(const std::filesystem::path& file) {
@@ -42,6 +43,7 @@ Result<SharedBytes> RandomAccessFile::read(std::uint64_t offset, std::uint64_t s
     return error(offset, std::to_string(size) + " bytes needed, the file ends after " + std::to_string(size_));
   std::uint8_t* at = nullptr;
   SharedBytes result = allocate(size, at);
+  if (at == nullptr) return error(offset, "no memory for " + std::to_string(size) + " bytes");
   for (std::uint64_t done = 0; done < size;) {
     errno = 0;
     const ssize_t got = ::pread(descriptor_, at + done, size - done, static_cast<off_t>(offset + done));

@@ -96,7 +96,9 @@ class Ros1Bag final : public ChunkedBag {
     if (!bag) return false;
     const RecordFields header(bag->header.bytes);
     const auto index = header.number<std::uint64_t>("index_pos");
-    if (header.op() != ros1::kBagHeader || !index || *index == 0 || *index > file_.size()) return false;
+    if (header.op() != ros1::kBagHeader || !index || *index == 0 || *index > file_.size() ||
+        file_.size() - *index > kLargestPiece)
+      return false;
     const auto bytes = file_.read(*index, file_.size() - *index);
     if (!bytes) return false;
     ByteCursor cursor(bytes->bytes);
@@ -108,6 +110,10 @@ class Ros1Bag final : public ChunkedBag {
         add_connection(fields.number<std::uint32_t>("conn").value_or(0), topic_in(fields, data));
       if (fields.op() == ros1::kChunkInfo && !add_chunk_info(fields, data)) return false;
     }
+    std::uint64_t messages = 0;
+    for (const Chunk& chunk : chunks_)
+      for (const auto& [topic, count] : chunk.counts) messages += count;
+    if (messages > file_.size()) return false;  // even compressed, a message takes a byte and more
     return chunks_.size() == header.number<std::uint32_t>("chunk_count").value_or(0);
   }
 

@@ -72,6 +72,7 @@ class ChunkedBag : public BagFile {
   std::int64_t first_ns_ = 0, last_ns_ = 0;
   mutable std::mutex mutex_;
   mutable std::list<std::pair<std::size_t, std::shared_ptr<const Loaded>>> recent_;
+  mutable std::size_t recent_bytes_ = 0;
 };
 
 }  // namespace revisit::io_internal

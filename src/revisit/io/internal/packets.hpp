@@ -45,9 +45,10 @@ class PacketDecoder {
   /// Whether the packet is one of this sensor's measurements. The calls below take only these.
   virtual bool accepts(ByteSpan payload) const = 0;
   /// What tells the part's scan from others (angle or number), and whether a scan begins where it changes from one
-  /// value to another. Packets that came late begin none.
+  /// value to another. Parts that came late begin none.
   virtual std::uint32_t phase(ByteSpan payload, std::size_t part) const = 0;
   virtual bool begins_scan(std::uint32_t before, std::uint32_t now) const = 0;
+  virtual bool is_late(std::uint32_t before, std::uint32_t now) const = 0;
   /// Time of the part on the sensor's clock, and after how long that clock begins again; 0 for never.
   virtual std::int64_t time_ns(ByteSpan payload, std::size_t part) const = 0;
   virtual std::int64_t clock_period_ns() const = 0;

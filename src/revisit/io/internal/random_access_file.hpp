@@ -20,7 +20,7 @@ struct SharedBytes {
   ByteSpan bytes;
   SharedBytes part(std::size_t offset, std::size_t size) const { return {owner, bytes.subspan(offset, size)}; }
 };
-/// Room for `size` bytes, not yet touched: a size that lies costs no memory.
+/// Room for `size` bytes, not yet touched: a size that lies costs no memory. `writable` is null where there is none.
 SharedBytes allocate(std::size_t size, std::uint8_t*& writable);
 
 /// A file of any size, read in pieces. Reading is safe from several threads.

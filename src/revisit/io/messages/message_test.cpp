@@ -152,6 +152,13 @@ TEST(MessageValues, LengthsThatLieAreErrors) {
   EXPECT_FALSE(MessageValues::decode(definition, Serialisation::kRos1, many));
   const std::uint8_t inner[] = {0, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0x7F, 0, 0, 0, 0};
   EXPECT_FALSE(MessageValues::decode(definition, Serialisation::kRos1, inner));
+  // Ten of the next type in each of twenty: looked at one by one, they would never end.
+  std::string nested = "T1[] array\n";
+  for (int type = 1; type < 20; ++type) {
+    nested += "MSG: a/T" + std::to_string(type) + "\n";
+    for (int i = 0; i < 10; ++i) nested += "T" + std::to_string(type + 1) + " f" + std::to_string(i) + "\n";
+  }
+  EXPECT_FALSE(MessageValues::decode(parse("a/A", nested + "MSG: a/T20\nuint8 x\n"), Serialisation::kRos1, many));
   const auto circle = parse("a/A", "B b\nMSG: a/B\nA a\n");
   EXPECT_FALSE(MessageValues::decode(circle, Serialisation::kRos1, many)) << "holds itself";
 }

@@ -76,35 +76,43 @@ class MessageValues::Walk {
     }
   }
 
+  bool has_room(const std::string& path) {
+    constexpr std::size_t kMostValues = 1'000'000;
+    if (++noted_ <= kMostValues) return true;
+    fail(path, "too many values in the message");
+    return false;
+  }
+
   void numbers(Primitive primitive, const std::string& path, std::size_t count) {
     const std::size_t size = size_of(primitive);
     if (count > 0) align(size);
     const std::size_t begin = at_;
-    if (take(path, count, size)) (*target_)[path] = {primitive, begin, count};
+    if (take(path, count, size) && has_room(path)) (*target_)[path] = {primitive, begin, count};
   }
 
   void strings(const std::string& path, std::size_t count, bool is_one) {
     for (std::size_t i = 0; i < count && problem_.empty(); ++i) {
       const std::size_t size = length(path);
       const std::size_t begin = at_;
-      if (take(path, size, 1) && is_one) (*target_)[path] = {Primitive::kString, begin, size};
+      if (take(path, size, 1) && is_one && has_room(path)) (*target_)[path] = {Primitive::kString, begin, size};
     }
   }
 
-  bool holds_numbers_alone(std::size_t type, int depth) const {
-    if (depth > kDeepest) return false;
+  bool holds_numbers_alone(std::size_t type) {
+    const auto [known, is_new] = numbers_alone_.emplace(type, false);  // what holds itself does not
+    if (!is_new) return known->second;
     const auto& fields = definition_.types()[type].fields;
-    return std::all_of(fields.begin(), fields.end(), [&](const Field& field) {
-      if (field.repeat == Field::Repeat::kSequence || field.primitive == Primitive::kString) return false;
-      return field.primitive != Primitive::kNested ||
-             (field.repeat == Field::Repeat::kOnce && holds_numbers_alone(field.nested, depth + 1));
-    });
+    return numbers_alone_[type] = std::all_of(fields.begin(), fields.end(), [&](const Field& field) {
+             if (field.repeat == Field::Repeat::kSequence || field.primitive == Primitive::kString) return false;
+             return field.primitive != Primitive::kNested ||
+                    (field.repeat == Field::Repeat::kOnce && holds_numbers_alone(field.nested));
+           });
   }
 
   void messages(const Field& field, const std::string& path, std::size_t count, int depth) {
     values_.counts_[path] = count;
     if (count == 0) return;
-    if (!holds_numbers_alone(field.nested, depth)) {
+    if (!holds_numbers_alone(field.nested)) {
       for (std::size_t i = 0; i < count && problem_.empty(); ++i)
         message(field.nested, path + "[" + std::to_string(i) + "]", depth + 1);
       return;
@@ -118,7 +126,7 @@ class MessageValues::Walk {
     if (count > 1) message(field.nested, path, depth + 1);
     target_ = outer;
     const std::size_t stride = at_ - end_of_first;
-    if (stride % largest(field.nested, 0) != 0 && is_cdr_ && count > 2)
+    if (stride % largest(field.nested) != 0 && is_cdr_ && count > 2)
       return fail(path, "its messages are not evenly apart");
     for (auto& [name, value] : first) {
       value.messages = count;
@@ -128,13 +136,14 @@ class MessageValues::Walk {
     if (count > 2) take(path, count - 2, stride);
   }
 
-  std::size_t largest(std::size_t type, int depth) const {
+  std::size_t largest(std::size_t type) {
+    const auto [known, is_new] = largest_of_.emplace(type, 1);
+    if (!is_new) return known->second;
     std::size_t result = 1;
     for (const Field& field : definition_.types()[type].fields)
       result =
-          std::max(result, field.primitive == Primitive::kNested && depth < kDeepest ? largest(field.nested, depth + 1)
-                                                                                     : size_of(field.primitive));
-    return result;
+          std::max(result, field.primitive == Primitive::kNested ? largest(field.nested) : size_of(field.primitive));
+    return largest_of_[type] = result;
   }
 
   const MessageDefinition& definition_;
@@ -142,7 +151,9 @@ class MessageValues::Walk {
   MessageValues& values_;
   Values* target_;  ///< where values are noted
   std::size_t at_;
-  std::size_t messages_ = 0;
+  std::size_t messages_ = 0, noted_ = 0;
+  std::map<std::size_t, bool> numbers_alone_;      ///< by type, once it is known
+  std::map<std::size_t, std::size_t> largest_of_;  ///< likewise
   std::string problem_;
 };
 
@@ -229,7 +240,9 @@ std::size_t MessageValues::count(std::string_view path) const {
 
 std::int64_t MessageValues::stamp_ns(std::string_view path) const {
   const std::string prefix(path);
-  return integer(prefix + ".sec").value_or(0) * 1'000'000'000 + integer(prefix + ".nanosec").value_or(0);
+  constexpr std::int64_t kFarthest_s = 5'000'000'000;  // as uint32 reaches
+  return std::clamp(integer(prefix + ".sec").value_or(0), -kFarthest_s, kFarthest_s) * 1'000'000'000 +
+         std::clamp<std::int64_t>(integer(prefix + ".nanosec").value_or(0), 0, 4'294'967'295);
 }
 
 }  // namespace revisit::io_internal

@@ -117,6 +117,7 @@ void read_row(const std::uint8_t* records, std::size_t step, std::size_t count, 
 
 void read_points(const PointCloudView& cloud, const Columns& columns, Scan& scan, std::vector<double>& raw_times,
                  bool& rings_are_whole) {
+  if (cloud.width == 0) return;
   const std::size_t points = cloud.width * cloud.height;
   const std::size_t row_bytes = cloud.row_step != 0 ? cloud.row_step : cloud.width * cloud.point_step;
   scan.points.resize(points);

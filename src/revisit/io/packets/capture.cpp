@@ -102,8 +102,10 @@ class Capture {
       }
       ++number;
       if (frame->frame.empty()) continue;
+      forget_old_fragments(frame->time_ns);
       const IpHead head = parse_ip(frame->frame);
-      if (head.is_udp && head.has_more && head.fragment_at == 0) begun[{head.from, head.id}] = {at, number};
+      if (head.is_udp && (head.has_more || head.fragment_at != 0) && !fragments_.contains({head.from, head.id}))
+        begun[{head.from, head.id}] = {at, number};
       if (const auto found = join(head, frame->time_ns)) {
         Place place{found->packet.time_ns, at, 1};
         if (head.fragment_at != 0 || head.has_more) {
@@ -139,6 +141,7 @@ class Capture {
   struct Fragments {
     std::map<std::size_t, std::vector<std::uint8_t>> parts;
     std::size_t size = 0;  ///< of the whole, once it is known
+    std::int64_t begun_ns = 0;
   };
 
   Capture(std::filesystem::path file, pcap_t* handle)
@@ -155,6 +158,12 @@ class Capture {
                  ip_in(link_, {bytes, facts->caplen})};
   }
 
+  // Of packets that never became whole: their numbers come round again.
+  void forget_old_fragments(std::int64_t time_ns) {
+    constexpr std::int64_t kLongest_ns = 1'000'000'000;
+    std::erase_if(fragments_, [&](const auto& entry) { return time_ns - entry.second.begun_ns > kLongest_ns; });
+  }
+
   // The UDP packet that is whole with this piece.
   std::optional<Found> join(const IpHead& head, std::int64_t time_ns) {
     if (!head.is_udp) return std::nullopt;
@@ -164,6 +173,7 @@ class Capture {
       constexpr std::size_t kMostUnfinished = 64;
       if (fragments_.size() > kMostUnfinished) fragments_.clear();
       Fragments& fragments = fragments_[{head.from, head.id}];
+      fragments.begun_ns = time_ns;
       fragments.parts[head.fragment_at].assign(head.body.begin(), head.body.end());
       if (!head.has_more) fragments.size = head.fragment_at + head.body.size();
       for (const auto& [at, part] : fragments.parts) {

@@ -106,7 +106,8 @@ class OusterDecoder final : public PacketDecoder {
   std::int64_t clock_period_ns() const override { return 0; }
 
   bool accepts(ByteSpan payload) const override {
-    if (payload.size() != packet_bytes()) return false;
+    // Older drivers recorded a byte more than there is.
+    if (payload.size() != packet_bytes() && payload.size() != packet_bytes() + 1) return false;
     if (profile_.packet_head == 0) return true;
     const auto id = load_number<std::uint32_t>(payload.data() + (is_fusa() ? 1 : 4)) & 0xFFFFFF;
     return data_.initialisation < 0 || id == data_.initialisation;
@@ -117,11 +118,16 @@ class OusterDecoder final : public PacketDecoder {
     return load_number<std::uint16_t>(payload.data() + (is_fusa() ? 4 : 2));
   }
   bool begins_scan(std::uint32_t before, std::uint32_t now) const override {
-    const auto ahead = static_cast<std::uint16_t>(now - before);
-    return ahead != 0 && ahead < 0x8000;
+    return now != before && !is_late(before, now);
+  }
+  // A few frames back; farther, the sensor began to count again.
+  bool is_late(std::uint32_t before, std::uint32_t now) const override {
+    constexpr std::uint16_t kFewFrames = 16;
+    const auto back = static_cast<std::uint16_t>(before - now);
+    return back != 0 && back < kFewFrames;
   }
   std::int64_t time_ns(ByteSpan payload, std::size_t part) const override {
-    return static_cast<std::int64_t>(load_number<std::uint64_t>(column(payload, part)) & 0x7FFFFFFFFFFFFFFF);
+    return static_cast<std::int64_t>(load_number<std::uint64_t>(column(payload, part)) & 0x1FFFFFFFFFFFFFFF);
   }
 
   void decode(ByteSpan payload, std::size_t first, std::size_t end, PacketPoints& points) const override {

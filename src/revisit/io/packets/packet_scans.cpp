@@ -21,7 +21,10 @@ class PacketScans final : public ScanSource {
     std::optional<std::uint32_t> before;
     for (std::size_t i = 0; i < packets_->size(); ++i) {
       const auto packet = packets_->read(i);
-      if (!packet) return packet.error();
+      if (!packet) {  // the scan it belongs to says so, too
+        ++unreadable_;
+        continue;
+      }
       const ByteSpan payload = packet->payload.bytes;
       if (!decoder_->accepts(payload)) continue;
       for (std::size_t part = 0; part < decoder_->parts(); ++part) {
@@ -30,8 +33,8 @@ class PacketScans final : public ScanSource {
           begins_.push_back({i, part});
           received_ns_.push_back(packet->time_ns);
           if (!before) first_offset_ns_ = packet->time_ns - decoder_->time_ns(payload, part);
-        } else if (now < *before && !decoder_->begins_scan(*before, now)) {
-          continue;  // late, or trembling: the scan goes on
+        } else if (decoder_->is_late(*before, now)) {
+          continue;  // the scan goes on
         }
         before = now;
       }
@@ -87,8 +90,11 @@ class PacketScans final : public ScanSource {
   }
 
   std::vector<std::string> findings() const override {
-    return {"packets of a " + decoder_->sensor(),
-            "stamps: when the turn began, by the sensor's clock, which is set by when the first packet was received"};
+    std::vector<std::string> lines{
+        "packets of a " + decoder_->sensor(),
+        "stamps: when the turn began, by the sensor's clock, which is set by when the first packet was received"};
+    if (unreadable_ > 0) lines.push_back("packets: " + std::to_string(unreadable_) + " cannot be read");
+    return lines;
   }
 
  private:
@@ -124,6 +130,7 @@ class PacketScans final : public ScanSource {
   std::vector<Place> begins_;  ///< of each scan, and behind the last
   std::vector<std::int64_t> received_ns_;
   std::int64_t first_offset_ns_ = 0;
+  std::size_t unreadable_ = 0;
 };
 
 class TopicPackets final : public PacketSource {

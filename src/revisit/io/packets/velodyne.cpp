@@ -111,7 +111,13 @@ class VelodyneDecoder final : public PacketDecoder {
   std::uint32_t phase(ByteSpan payload, std::size_t part) const override {
     return static_cast<std::uint32_t>((azimuth(payload, part) + kFullCircle - kCut) % kFullCircle);
   }
-  bool begins_scan(std::uint32_t before, std::uint32_t now) const override { return now + kFullCircle / 2 < before; }
+  bool begins_scan(std::uint32_t before, std::uint32_t now) const override {
+    return now < before && !is_late(before, now);
+  }
+  // Less than half a turn back, across the cut, too.
+  bool is_late(std::uint32_t before, std::uint32_t now) const override {
+    return (now + kFullCircle - before) % kFullCircle > kFullCircle / 2;
+  }
   std::int64_t time_ns(ByteSpan payload, std::size_t part) const override {
     return std::int64_t{load_number<std::uint32_t>(payload.data() + kTimeAt)} * 1000 +
            static_cast<std::int64_t>(1e3 * part_us() * static_cast<double>(part));
