@@ -59,7 +59,8 @@ void ChunkedBag::finish_index() {
 }
 
 Result<std::shared_ptr<const ChunkedBag::Loaded>> ChunkedBag::loaded(std::size_t chunk) const {
-  constexpr std::size_t kKeptBytes = 64 << 20;  // what odometry and an IMU need around a cloud
+  // A few, whose memory is soon used again; and all that odometry and an IMU need around a cloud, where they are read.
+  constexpr std::size_t kFew = 4, kAroundBytes = 64 << 20;
   {
     const std::lock_guard lock(mutex_);
     for (auto it = recent_.begin(); it != recent_.end(); ++it)
@@ -79,7 +80,7 @@ Result<std::shared_ptr<const ChunkedBag::Loaded>> ChunkedBag::loaded(std::size_t
   const std::lock_guard lock(mutex_);
   recent_.emplace_front(chunk, made);
   recent_bytes_ += made->bytes.bytes.size();
-  while (recent_bytes_ > kKeptBytes && recent_.size() > 1) {
+  while (recent_.size() > kFew && (!keeps_around_ || recent_bytes_ > kAroundBytes)) {
     recent_bytes_ -= recent_.back().second->bytes.bytes.size();
     recent_.pop_back();
   }
@@ -107,6 +108,10 @@ Result<BagMessage> ChunkedBag::read(std::size_t topic, std::uint64_t index) cons
 
 Status ChunkedBag::visit(std::size_t topic, std::int64_t from_ns, std::int64_t to_ns,
                          const std::function<bool(const BagMessage&)>& use) const {
+  {
+    const std::lock_guard lock(mutex_);
+    keeps_around_ = true;
+  }
   for (const Place& place : places_.at(topic)) {
     const Chunk& chunk = chunks_[place.chunk];
     if (chunk.first_ns > to_ns) break;

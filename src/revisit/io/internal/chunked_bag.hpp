@@ -73,6 +73,7 @@ class ChunkedBag : public BagFile {
   mutable std::mutex mutex_;
   mutable std::list<std::pair<std::size_t, std::shared_ptr<const Loaded>>> recent_;
   mutable std::size_t recent_bytes_ = 0;
+  mutable bool keeps_around_ = false;  ///< messages are asked for by their times
 };
 
 }  // namespace revisit::io_internal
