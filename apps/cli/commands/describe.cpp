@@ -68,7 +68,7 @@ Run add_describe(CLI::App& program) {
   command->footer(
       "Example: revisit describe 000042.bin --out scan.png --preset paper\n"
       "         revisit describe kitti/sequences/00 --frame 42 --out scan.png");
-  command->add_option("scan", options->scan, "Scan: .bin, .pcd or .ply; or a recording")->required();
+  command->add_option("scan", options->scan, "Scan: .bin, .pcd, .ply or .las; or a recording")->required();
   command->add_option("--frame", options->frame, "Which scan of the recording");
   command->add_option("--out", options->picture, "The picture to write, .png")->required();
   command->add_option("--calibration", options->calibration, "Intensity calibration made by `revisit calibrate`");

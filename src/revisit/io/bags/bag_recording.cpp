@@ -195,12 +195,7 @@ Result<std::unique_ptr<Recording>> open_bag_recording(const std::filesystem::pat
   auto scans = open_scans(bag, *choice->lidar, options, remarks->about(path));
   if (!scans) return scans.error();
   auto recording = std::make_unique<BagRecording>(bag, *std::move(choice), *std::move(scans));
-  if (!options.poses_file.empty()) {
-    auto trajectory = read_trajectory(options.poses_file, *recording);
-    if (!trajectory) return trajectory.error();
-    recording->set_trajectory(*std::move(trajectory));
-  }
-  return std::unique_ptr<Recording>(std::move(recording));
+  return with_poses(std::move(recording), options.poses_file);
 }
 
 }  // namespace revisit::io_internal

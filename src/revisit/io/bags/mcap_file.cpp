@@ -236,11 +236,7 @@ class McapFile final : public ChunkedBag {
 }  // namespace
 
 Result<std::unique_ptr<BagFile>> open_mcap(const std::filesystem::path& file, const LogSink& log) {
-  auto opened = RandomAccessFile::open(file);
-  if (!opened) return opened.error();
-  auto bag = std::make_unique<McapFile>(*std::move(opened));
-  if (const Status status = bag->open(log); !status) return status.error();
-  return std::unique_ptr<BagFile>(std::move(bag));
+  return open_chunked_bag<McapFile>(file, log);
 }
 
 }  // namespace revisit::io_internal

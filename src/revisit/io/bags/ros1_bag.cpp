@@ -206,11 +206,7 @@ class Ros1Bag final : public ChunkedBag {
 }  // namespace
 
 Result<std::unique_ptr<BagFile>> open_ros1_bag(const std::filesystem::path& file, const LogSink& log) {
-  auto opened = RandomAccessFile::open(file);
-  if (!opened) return opened.error();
-  auto bag = std::make_unique<Ros1Bag>(*std::move(opened));
-  if (const Status status = bag->open(log); !status) return status.error();
-  return std::unique_ptr<BagFile>(std::move(bag));
+  return open_chunked_bag<Ros1Bag>(file, log);
 }
 
 }  // namespace revisit::io_internal

@@ -18,4 +18,16 @@ bool is_capture(const std::filesystem::path& path);
 /// Poses of a file for the scans of a recording that is open.
 Result<Trajectory> read_trajectory(const std::filesystem::path& poses_file, const Recording& recording);
 
+/// The recording with the poses of that file, if one is named.
+template <typename Kind>
+Result<std::unique_ptr<Recording>> with_poses(std::unique_ptr<Kind> recording,
+                                              const std::filesystem::path& poses_file) {
+  if (!poses_file.empty()) {
+    auto trajectory = read_trajectory(poses_file, *recording);
+    if (!trajectory) return trajectory.error();
+    recording->set_trajectory(*std::move(trajectory));
+  }
+  return std::unique_ptr<Recording>(std::move(recording));
+}
+
 }  // namespace revisit::io_internal

@@ -76,4 +76,14 @@ class ChunkedBag : public BagFile {
   mutable bool keeps_around_ = false;  ///< messages are asked for by their times
 };
 
+/// A bag of a format derived from ChunkedBag, whose open() reads what the file holds.
+template <typename Format>
+Result<std::unique_ptr<BagFile>> open_chunked_bag(const std::filesystem::path& file, const LogSink& log) {
+  auto opened = RandomAccessFile::open(file);
+  if (!opened) return opened.error();
+  auto bag = std::make_unique<Format>(*std::move(opened));
+  if (const Status status = bag->open(log); !status) return status.error();
+  return std::unique_ptr<BagFile>(std::move(bag));
+}
+
 }  // namespace revisit::io_internal

@@ -132,12 +132,7 @@ Result<std::unique_ptr<Recording>> open_capture_recording(const fs::path& file, 
   auto scans = scans_of_packets(stream.packets, lidar->decoder, file.string());
   if (!scans) return scans.error();
   auto recording = std::make_unique<CaptureRecording>(*std::move(scans), stream.name);
-  if (!options.poses_file.empty()) {
-    auto trajectory = read_trajectory(options.poses_file, *recording);
-    if (!trajectory) return trajectory.error();
-    recording->set_trajectory(*std::move(trajectory));
-  }
-  return std::unique_ptr<Recording>(std::move(recording));
+  return with_poses(std::move(recording), options.poses_file);
 }
 
 }  // namespace revisit::io_internal

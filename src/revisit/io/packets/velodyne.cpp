@@ -27,8 +27,9 @@ struct Model {
   double firing_us;     ///< from one firing of all lasers to the next
   double laser_us;      ///< from one laser, or pair of lasers, to the next
   std::size_t at_once;  ///< lasers that fire together
-  /// Where the reference decoder of ROS, with which clouds are to agree, departs from the manual: it turns the sensor
-  /// on by a laser's time for each of a pair, too, and does not turn it on within a packet's last block.
+  /// Two places where ROS's reference decoder departs from the manual, followed so that its clouds and ours agree: it
+  /// interpolates the azimuth as if lasers of a pair fired one after the other, and not at all in a packet's last
+  /// block.
   bool turns_each_laser, last_block_stands;
   std::array<float, kReturns> elevation_deg, azimuth_deg;
 
