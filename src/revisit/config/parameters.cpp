@@ -85,6 +85,13 @@ const std::vector<Entry>& table() {
       REVISIT_REAL(simulation, difficulty, 0, 2,
                    "how much changes between visits, looks alike, hides, shakes and errs: 0 tame, 1 as real roads"),
       REVISIT_REAL(simulation, length_m, 20, 50000, "length of a drive of its own"),
+      REVISIT_INTEGER(
+          simulation, day, 0, 1000000,
+          "another day in the same world: parked cars, traffic, foliage, weather and the sensor's errors differ"),
+      REVISIT_REAL(simulation, from_m, 0, 50000, "drives only the part of the way that begins after so many metres"),
+      REVISIT_REAL(simulation, to_m, 0, 50000, "and ends after so many; 0 for its end"),
+      REVISIT_SWITCH(simulation, reverse, "drives the way from its end to its beginning"),
+      REVISIT_REAL(simulation, beside_m, -1, 2.5, "drives so far to the left of the way"),
       REVISIT_INTEGER(simulation, frames, 0, 10000000, "only the first so many scans; 0 for all of the drive"),
       REVISIT_REAL(simulation, tilt_deg, 0, 40, "how far a sensor carried by hand leans to and fro, at most"),
       REVISIT_SWITCH(simulation, motion_distortion,

@@ -72,6 +72,11 @@ struct SimulationOptions {
   int seed = 1;
   double difficulty = 0.0;        ///< how much changes and errs: 0 tame, 1 as the real world (docs/simulation.md)
   double length_m = 1000.0;       ///< of a drive of its own
+  int day = 0;                    ///< another day: another drive through the same world, parked cars and traffic differ
+  double from_m = 0.0;            ///< only the part of the drive from here
+  double to_m = 0.0;              ///< to here; 0: its end
+  bool reverse = false;           ///< driven the other way round
+  double beside_m = 0.0;          ///< driven so far to the left of the drive's way
   int frames = 0;                 ///< the first so many scans; 0: all of the drive
   double tilt_deg = 0.0;          ///< how far a sensor carried by hand leans, at most
   bool motion_distortion = true;  ///< the sensor moves while it sweeps

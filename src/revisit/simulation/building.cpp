@@ -185,7 +185,9 @@ Result<World> build_building(const SimulationOptions& options) {
   World world{std::move(path),   std::move(terrain),     {}, {}, {}, {}, seed, options.difficulty,
               {1.0, 0.15, 0.15}, Eigen::Vector3d::Zero()};  // carried before the chest
   BuildingBuilder(world).build();
-  world.movers.note_visits(world.path, 12.0);
+  if (const Status status = choose_drive(world, options); !status) return status.error();
+  if (world.day != 0) random = Random(world.seed_of_day());
+  world.movers.note_visits(world.path, world.day, 12.0);
   const int people = static_cast<int>(std::lround(5.0 * options.traffic));
   for (int i = 0; i < people; ++i) {
     Mover mover;

@@ -8,9 +8,11 @@
 
 namespace revisit::simulation_internal {
 
-void Movers::note_visits(const Path& path, double in_sight_m) {
+void Movers::note_visits(const Path& path, int day, double in_sight_m) {
   constexpr double kAway_s = 8.0, kLook_s = 0.5;
+  constexpr std::uint64_t kVisitsADay = 1000;  // more than there are
   for (ParkingSlot& slot : slots) {
+    slot.visits_before = kVisitsADay * static_cast<std::uint64_t>(day);
     // Between two visits, the car changes while the sensor is farthest away.
     double last_near_s = -1.0, farthest_m = 0.0, farthest_s = 0.0;
     for (double time_s = 0.0; time_s <= path.duration_s(); time_s += kLook_s) {
@@ -33,7 +35,7 @@ void Movers::note_visits(const Path& path, double in_sight_m) {
 
 std::optional<std::uint64_t> occupant(const ParkingSlot& slot, double time_s) {
   const auto changes = std::upper_bound(slot.changes_s.begin(), slot.changes_s.end(), static_cast<float>(time_s));
-  const auto visit = static_cast<std::uint64_t>(changes - slot.changes_s.begin());
+  const auto visit = slot.visits_before + static_cast<std::uint64_t>(changes - slot.changes_s.begin());
   const std::uint64_t stays = static_cast<double>(uniform(mix(slot.seed, 1))) < slot.stays ? 0 : visit;
   const std::uint64_t key = mix(slot.seed, stays, 2);
   if (static_cast<double>(uniform(key)) >= slot.occupancy) return std::nullopt;

@@ -23,6 +23,20 @@ Path Path::moved(const Eigen::Vector3d& by) const {
   return Path(std::move(knots));
 }
 
+Path Path::part(double from_m, double to_m, double left_m, bool reverse) const {
+  std::vector<Knot> knots;
+  for (std::size_t i = 0; i < knots_.size(); ++i) {
+    if (arc_m_[i] < from_m || arc_m_[i] > to_m) continue;
+    Knot knot = knots_[i];
+    knot.x -= left_m * std::sin(knot.yaw_rad);
+    knot.y += left_m * std::cos(knot.yaw_rad);
+    if (reverse) knot.yaw_rad = wrap_angle(knot.yaw_rad + kPi);
+    knots.push_back(knot);
+  }
+  if (reverse) std::reverse(knots.begin(), knots.end());
+  return knots.size() < 2 ? Path() : Path(std::move(knots));
+}
+
 Knot Path::at(double time_s) const {
   const double last = static_cast<double>(knots_.size() - 1);
   const double position = time_s / kStep_s, from = std::clamp(std::floor(position), 0.0, last - 1.0);

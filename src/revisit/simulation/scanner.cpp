@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kFalloffStep_m = 0.25;
 constexpr double kSeason_s = 100.0;     // in which foliage changes: longer than a place is in sight
+constexpr double kSeasonsADay = 37.3;   // between two days that are simulated
 constexpr double kWeather_s = 150.0;    // in which rain, sun and wet surfaces come and go
 constexpr std::size_t kPoseKnots = 51;  // poses within a sweep, linear between them
 
@@ -52,8 +53,8 @@ Scanner::Scanner(const World& world, SensorModel sensor, const Options& options)
     falloff_.push_back(range_m > sensor_.focus_m ? std::pow(sensor_.focus_m / range_m, sensor_.falloff) : 1.0);
   for (std::size_t i = 0; i < lines; ++i) {
     // All lines are off by the same, as the mounting or the maker's table is, and each by a little of its own.
-    const double error_deg = world.difficulty * static_cast<double>(0.12f * gaussian(mix(world.seed, 53)) +
-                                                                    0.03f * gaussian(mix(world.seed, 54, i)));
+    const double error_deg = world.difficulty * static_cast<double>(0.12f * gaussian(mix(world.seed_of_day(), 53)) +
+                                                                    0.03f * gaussian(mix(world.seed_of_day(), 54, i)));
     const double elevation = sensor_.rotates() ? to_radians(sensor_.elevations_deg[i] + error_deg) : 0.0;
     cos_elevation_.push_back(static_cast<float>(std::cos(elevation)));
     sin_elevation_.push_back(static_cast<float>(std::sin(elevation)));
@@ -81,8 +82,8 @@ Pose Scanner::T_local_lidar(double time_s) const {
   const double height_m = world_.vehicle.roof_m + sensor_.mast_m;
   Pose T = Pose::Identity();
   if (options_.tilt_deg > 0.0) {  // carried by hand: it sways about itself, now and then as far as it may
-    Eigen::Vector3d tilt(1.6 * smooth_noise(mix(world_.seed, 64), time_s / 2.3),
-                         1.6 * smooth_noise(mix(world_.seed, 65), time_s / 2.9), 0.0);
+    Eigen::Vector3d tilt(1.6 * smooth_noise(mix(world_.seed_of_day(), 64), time_s / 2.3),
+                         1.6 * smooth_noise(mix(world_.seed_of_day(), 65), time_s / 2.9), 0.0);
     tilt *= to_radians(options_.tilt_deg) / std::max(1.0, tilt.norm());
     T.translate(Eigen::Vector3d(at.x, at.y, world_.terrain.height(at.x, at.y) + height_m));
     T.rotate(Eigen::AngleAxisd(at.yaw_rad, Eigen::Vector3d::UnitZ()));
@@ -100,10 +101,10 @@ Pose Scanner::T_local_lidar(double time_s) const {
   double z = 0.25 * (front + back + left + right);
   if (!world_.roads.points().empty()) {             // springs
     const double shakes = 1.0 + world_.difficulty;  // and is loaded otherwise from drive to drive
-    pitch += to_radians(0.4) * shakes * smooth_noise(mix(world_.seed, 61), time_s / 0.9) +
-             to_radians(0.8) * world_.difficulty * smooth_noise(mix(world_.seed, 66), time_s / 9.0);
-    roll += to_radians(0.5) * shakes * smooth_noise(mix(world_.seed, 62), time_s / 1.1);
-    z += 0.015 * smooth_noise(mix(world_.seed, 63), time_s / 0.7);
+    pitch += to_radians(0.4) * shakes * smooth_noise(mix(world_.seed_of_day(), 61), time_s / 0.9) +
+             to_radians(0.8) * world_.difficulty * smooth_noise(mix(world_.seed_of_day(), 66), time_s / 9.0);
+    roll += to_radians(0.5) * shakes * smooth_noise(mix(world_.seed_of_day(), 62), time_s / 1.1);
+    z += 0.015 * smooth_noise(mix(world_.seed_of_day(), 63), time_s / 0.7);
   }
   T.translate(Eigen::Vector3d(at.x, at.y, z));
   T.rotate(Eigen::AngleAxisd(at.yaw_rad, Eigen::Vector3d::UnitZ()) *
@@ -228,7 +229,7 @@ bool Scanner::meets_own_roof(const Eigen::Vector3f& direction) const {
 void Scanner::cast(const Sweep& sweep, std::size_t first, std::size_t count, Return* returns) const {
   Met neighbour;
   Return before;
-  const auto season = static_cast<float>(sweep.time_s / kSeason_s);
+  const auto season = static_cast<float>(sweep.time_s / kSeason_s + kSeasonsADay * world_.day);
   std::array<Ray, RayScene::kPacket> rays;
   std::array<Met, RayScene::kPacket> mets;
   const auto columns = static_cast<std::size_t>(sensor_.columns);
@@ -275,8 +276,8 @@ Scan Scanner::sweep(std::int64_t frame, double time_s) const {
   Sweep sweep;
   sweep.time_s = time_s;
   sweep.clear = static_cast<float>(
-      std::exp(-0.03 * world_.difficulty * (1.0 + smooth_noise(mix(world_.seed, 55), time_s / kWeather_s))));
-  sweep.key = mix(world_.seed, 71, static_cast<std::uint64_t>(frame));
+      std::exp(-0.03 * world_.difficulty * (1.0 + smooth_noise(mix(world_.seed_of_day(), 55), time_s / kWeather_s))));
+  sweep.key = mix(world_.seed_of_day(), 71, static_cast<std::uint64_t>(frame));
   sweep.moving = world_.movers.at(time_s, world_.path, [this](double x, double y) { return world_.stand_z(x, y); });
   if (!sweep.moving.empty()) sweep.scene = std::make_unique<RayScene>(scene_, sweep.moving, static_cast<float>(half_s));
 

@@ -31,7 +31,8 @@ FrameId SimulatedRecording::frame(std::size_t index) const { return FrameId{stat
 double SimulatedRecording::stamp_s(std::size_t index) const { return Path::kStep_s * static_cast<double>(index); }
 std::string SimulatedRecording::kind() const {
   return "simulated " + parts_->options.world + ", " + parts_->sensor.title + ", seed " +
-         std::to_string(parts_->options.seed);
+         std::to_string(parts_->options.seed) +
+         (parts_->options.day == 0 ? std::string() : ", day " + std::to_string(parts_->options.day));
 }
 const Trajectory& SimulatedRecording::trajectory() const { return parts_->truth; }
 const Trajectory& SimulatedRecording::wheel_odometry() const { return parts_->wheels; }
@@ -54,7 +55,7 @@ Result<Scan> SimulatedRecording::read(std::size_t index) const {
 }
 
 std::vector<ImuSample> SimulatedRecording::imu(double stamp_s, double from_s, double to_s) const {
-  return simulation_internal::imu_samples(*parts_->scanner, parts_->world.seed, stamp_s, from_s, to_s);
+  return simulation_internal::imu_samples(*parts_->scanner, parts_->world.seed_of_day(), stamp_s, from_s, to_s);
 }
 
 Result<std::unique_ptr<SimulatedRecording>> simulate(const SimulationOptions& options, const LogSink& log,
@@ -78,8 +79,8 @@ Result<std::unique_ptr<SimulatedRecording>> simulate(const SimulationOptions& op
     const double stamp_s = Path::kStep_s * static_cast<double>(i);
     parts->truth.entries[FrameId{static_cast<std::int64_t>(i)}] = {stamp_s, parts->scanner->T_world_lidar(stamp_s)};
   }
-  parts->wheels = simulation_internal::wheel_odometry(parts->truth, parts->world.seed);
-  parts->drifting = simulation_internal::drifting_odometry(parts->truth, parts->world.seed);
+  parts->wheels = simulation_internal::wheel_odometry(parts->truth, parts->world.seed_of_day());
+  parts->drifting = simulation_internal::drifting_odometry(parts->truth, parts->world.seed_of_day());
   return std::unique_ptr<SimulatedRecording>(new SimulatedRecording(std::move(parts)));
 }
 

@@ -336,11 +336,13 @@ void let_foliage_change(World& world) {
 
 }  // namespace
 
-void populate_town(World& world, double traffic) {
+Status populate_town(World& world, const SimulationOptions& options) {
   TownBuilder(world).build();
   let_foliage_change(world);
-  world.movers.note_visits(world.path);
-  plan_traffic(world, traffic);
+  if (Status status = choose_drive(world, options); !status) return status;
+  world.movers.note_visits(world.path, world.day);
+  plan_traffic(world, options.traffic);
+  return ok();
 }
 
 Result<World> build_town(const SimulationOptions& options, const LogSink& log) {
@@ -368,7 +370,7 @@ Result<World> build_town(const SimulationOptions& options, const LogSink& log) {
     const Knot knot = world.path.beside(arc_m, 0.0);
     world.featureless.emplace_back(knot.x, knot.y);
   }
-  populate_town(world, options.traffic);
+  if (const Status status = populate_town(world, options); !status) return status.error();
   return world;
 }
 

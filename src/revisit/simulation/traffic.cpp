@@ -11,7 +11,7 @@ namespace {
 // Lets vehicles and people move where there is room for them.
 class TrafficPlanner {
  public:
-  explicit TrafficPlanner(World& world) : world_(world), random_(mix(world.seed, 31)) {
+  explicit TrafficPlanner(World& world) : world_(world), random_(mix(world.seed_of_day(), 31)) {
     for (const Solid& solid : world.solids) {
       const double foot_m =
           static_cast<double>(solid.centre.z() - solid.half.z()) -

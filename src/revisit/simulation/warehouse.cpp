@@ -136,6 +136,9 @@ Result<World> build_warehouse(const SimulationOptions& options) {
   add_machines(world.solids, plan, mix(seed, 5));
   add_box(world.solids, {0.5, plan.south_y(), 0, 0}, 0.6, 0.8, 0.0, 0.9, Material::kPlastic, 95);  // the dock
 
+  if (const Status status = choose_drive(world, options); !status) return status.error();
+  if (world.day != 0) random = Random(world.seed_of_day());
+
   // People along the cross aisles, and a fork lift in the yard; who meets the robot steps aside.
   const int people = static_cast<int>(std::lround(6.0 * options.traffic));
   for (int i = 0; i < people; ++i) {

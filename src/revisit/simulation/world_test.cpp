@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <revisit/core/pose.hpp>
+
 namespace revisit::simulation_internal {
 namespace {
 
@@ -51,6 +53,38 @@ TEST(World, ParkedCarsLineTheStreetsAndMostChangeBetweenVisits) {
     EXPECT_GT(changed, revisited / 3);
     EXPECT_LT(changed, revisited) << "some stay";
   }
+}
+
+// Another day: the same town, driven the other way round and in part; other cars are parked in it.
+TEST(World, AnotherDayIsAnotherDriveThroughTheSameWorld) {
+  SimulationOptions options;
+  const World world = *build_town(options, {});
+  options.day = 2;
+  options.from_m = 100.0;
+  options.to_m = 300.0;
+  options.reverse = true;
+  options.beside_m = 1.5;
+  const World other = *build_town(options, {});
+  EXPECT_NEAR(other.path.length_m(), 200.0, 15.0) << "bends are shorter or longer beside";
+  const Knot first = other.path.knots().front(), whole = world.path.beside(300.0, 1.5);
+  EXPECT_LT(std::hypot(first.x - whole.x, first.y - whole.y), 1.5);
+  EXPECT_NEAR(std::abs(wrap_angle(first.yaw_rad - whole.yaw_rad)), kPi, 0.05);
+
+  ASSERT_EQ(world.solids.size(), other.solids.size());
+  for (std::size_t i = 0; i < world.solids.size(); ++i)
+    ASSERT_EQ(world.solids[i].centre, other.solids[i].centre) << "what stands there stays";
+  ASSERT_EQ(world.movers.slots.size(), other.movers.slots.size());
+  std::size_t changed = 0;
+  for (std::size_t i = 0; i < world.movers.slots.size(); ++i)
+    changed += occupant(world.movers.slots[i], 0.0) != occupant(other.movers.slots[i], 0.0);
+  EXPECT_GT(changed, world.movers.slots.size() / 3);
+  EXPECT_LT(changed, world.movers.slots.size()) << "some stay";
+
+  options.from_m = 5000.0;
+  options.to_m = 6000.0;
+  const auto nothing = build_town(options, {});
+  ASSERT_FALSE(nothing);
+  EXPECT_NE(nothing.error().message.find("simulation.from_m = 5000"), std::string::npos) << nothing.error().message;
 }
 
 TEST(World, NobodyMovesThroughWallsOrThroughTheSensorsVehicle) {

@@ -19,6 +19,7 @@ struct ParkingSlot {
   double vans = 1.0 / 9.0;  ///< share of the vehicles
   double shifts_m = 0.0;    ///< along the slot, from visit to visit, at most
   For use = For::kVehicle;
+  std::uint64_t visits_before = 0;    ///< on other days
   std::vector<float> changes_s = {};  ///< when it may have changed: while the sensor is far away, between two visits
 };
 
@@ -44,8 +45,8 @@ class Movers {
   std::vector<ParkingSlot> slots;
   std::vector<Mover> movers;
 
-  /// To be called once all slots are there: finds when the path comes within sight of each.
-  void note_visits(const Path& path, double in_sight_m = 65.0);
+  /// To be called once all slots are there: finds when the path comes within sight of each, on this day.
+  void note_visits(const Path& path, int day, double in_sight_m = 65.0);
   /// The solids of what is near the sensor at `time_s`, with their velocities. `ground` gives the height at (x, y).
   template <typename Ground>
   Solids at(double time_s, const Path& path, Ground ground) const;

@@ -29,6 +29,9 @@ class Path {
   double duration_s() const { return kStep_s * static_cast<double>(knots_.size() - 1); }
   /// The same way from elsewhere.
   Path moved(const Eigen::Vector3d& by) const;
+  /// The part from `from_m` to `to_m` of its length, `left_m` to the left of it, driven the other way round if
+  /// `reverse`; empty where fewer than two knots are in it.
+  Path part(double from_m, double to_m, double left_m, bool reverse) const;
   double length_m() const { return arc_m_.back(); }
   /// At `time_s` from the first knot; beyond the ends it goes on straight.
   Knot at(double time_s) const;

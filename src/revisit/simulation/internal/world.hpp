@@ -37,6 +37,10 @@ struct World {
   /// What is added to give the coordinates that the user knows: inside, the drive starts near (0, 0, 0), so that floats
   /// hold every place to a tenth of a millimetre.
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  int day = 0;  ///< the world is the same on another day, but for what comes and goes
+
+  /// Of what differs from day to day.
+  std::uint64_t seed_of_day() const { return day == 0 ? seed : mix(seed, 211, static_cast<std::uint64_t>(day)); }
 
   Ground ground_at(float x, float y) const;
   /// Height of what stands at a place.
@@ -65,10 +69,14 @@ struct StreetDrive {
 };
 StreetDrive drive_through_streets(double length_m, std::uint64_t seed);
 
+/// From here on the world's path is the part that is driven, in the direction and as far beside it as the options say,
+/// on their day. An error where nothing is left of it.
+Status choose_drive(World& world, const SimulationOptions& options);
+
 /// Who moves through the town while the sensor drives: none through walls, none in the sensor's way.
 void plan_traffic(World& world, double traffic);
 
-/// Fills the town along its roads.
-void populate_town(World& world, double traffic);
+/// Fills the town along its roads, then chooses the drive, and lets traffic and people meet it.
+Status populate_town(World& world, const SimulationOptions& options);
 
 }  // namespace revisit::simulation_internal
