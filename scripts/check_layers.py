@@ -31,7 +31,7 @@ ALLOWED = {
 DOORS = {
     "pcl/": {"src/revisit/io", "benchmarks"},
     "hwy/": {"src/revisit/bits", "src/revisit/descriptors"},
-    "xxhash": {"src/revisit/retrieval"},
+    "xxhash": {"src/revisit/retrieval", "src/revisit/store"},
     "faiss/": {"benchmarks"},
     "nanoflann": {"benchmarks"},
     "ceres/": {"src/revisit/pose_graph"},

@@ -165,12 +165,12 @@ TEST(Cli, DetectLooksForScansInASavedMap) {
                            " --out " + map.string());
   ASSERT_EQ(slam.code, 0) << slam.output;
   const std::string query = " --out " + (folder / "found").string() + " --overwrite";
-  for (const fs::path& database : {map, map / "map.sqlite"}) {
+  for (const fs::path& database : {map, map / "map.revisit"}) {
     const Outcome found = run("detect " + recording.string() + " --database " + database.string() + query);
     ASSERT_EQ(found.code, 0) << found.output;
     EXPECT_GE(read_loops(folder / "found" / "loops.csv")->size(), 10u) << found.output;
   }
-  fs::remove(map / "map.sqlite");
+  fs::remove(map / "map.revisit");
   const Outcome exports = run("detect " + recording.string() + " --database " + map.string() + query);
   EXPECT_EQ(exports.code, 1);
   EXPECT_NE(exports.output.find("holds a map"), std::string::npos) << exports.output;

@@ -46,7 +46,7 @@ TEST(SlamCli, WritesTrajectoryMapAndGraph) {
   ASSERT_EQ(ply->points.size(), pcd->points.size());
   EXPECT_EQ(ply->points[500].x, pcd->points[500].x);
   EXPECT_EQ(ply->points[500].intensity, pcd->points[500].intensity);
-  for (const char* name : {"map.png", "tiles/tiles.json", "run.json", "loops.csv", "candidates.csv", "map.sqlite"})
+  for (const char* name : {"map.png", "tiles/tiles.json", "run.json", "loops.csv", "candidates.csv", "map.revisit"})
     EXPECT_TRUE(fs::exists(out / name)) << name;
 
   const auto evaluated = run("evaluate " + out.string() + " --reference " + drive.string());
@@ -78,7 +78,7 @@ TEST(SlamCli, GoesOnAfterAKill) {
   // As soon as some key frames are there.
   const auto has_some = [&] {
     std::error_code failure;
-    const auto bytes = fs::file_size(out / "map.sqlite-wal", failure);
+    const auto bytes = fs::file_size(out / "map.revisit-wal", failure);
     return !failure && bytes > 300'000;
   };
   int how = 0;
@@ -130,10 +130,10 @@ TEST(SlamCli, SaysWhatItCannotDo) {
             std::string::npos);
   EXPECT_EQ(run("slam nowhere" + out).code, 1);
   fs::create_directories(folder / "x");
-  std::ofstream(folder / "x" / "map.sqlite") << "this is no map";
+  std::ofstream(folder / "x" / "map.revisit") << "this is no map";
   const auto damaged = run("slam " + drive.string() + out + " --resume");
   EXPECT_EQ(damaged.code, 1);
-  EXPECT_NE(damaged.output.find("map.sqlite"), std::string::npos) << damaged.output;
+  EXPECT_NE(damaged.output.find("map.revisit"), std::string::npos) << damaged.output;
 }
 
 }  // namespace

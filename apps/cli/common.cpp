@@ -11,6 +11,7 @@
 #include <revisit/io/bag_topics.hpp>
 #include <revisit/io/calibration_file.hpp>
 #include <revisit/simulation/simulated_recording.hpp>
+#include <revisit/store/map_store.hpp>
 
 namespace revisit::cli {
 namespace {
@@ -109,6 +110,14 @@ std::string InputFlags::text() const {
   if (without_imu_) text += " no_imu";
   if (options_.last_return) text += " last_return";
   return text;
+}
+
+bool is_map(const std::filesystem::path& input) {
+  std::error_code failure;
+  const std::filesystem::path file = MapStore::file_of(input);
+  const bool is_in_folder = file != input;
+  return std::filesystem::is_regular_file(file, failure) &&
+         (is_in_folder || file.extension() == ".revisit" || file.extension() == ".sqlite");
 }
 
 bool is_recording(const std::string& input) {

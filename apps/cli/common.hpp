@@ -78,6 +78,9 @@ inline constexpr const char* kRecordingHelp =
 /// Whether a path is a recording, not a single scan.
 bool is_recording(const std::string& input);
 
+/// Whether a path is a saved map, or a folder that holds one.
+bool is_map(const std::filesystem::path& input);
+
 /// A recording on the disk, or the one that a file of parameters (.toml) describes, simulated while it is read; its
 /// options then stand in `parameters`, if given.
 Result<std::unique_ptr<Recording>> open_input(const std::string& input, const RecordingOptions& options = {},

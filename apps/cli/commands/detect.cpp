@@ -148,9 +148,8 @@ struct Database {
 Result<Database> open_database(const std::string& path, const Parameters& parameters) {
   Database database;
   if (path.empty()) return database;
-  std::error_code failure;
   const std::filesystem::path file = path;
-  if (file.filename() == MapStore::kFileName || std::filesystem::exists(file / MapStore::kFileName, failure)) {
+  if (is_map(file)) {
     auto map = Localiser::open(file, parameters, print_log());
     if (!map) return map.error();
     database.map = *std::move(map);

@@ -77,8 +77,9 @@ Result<Trajectory> load_reference(const EvaluateOptions& options, const Recordin
 // `revisit slam` queries and answers with key frames: only these count in tables 1 and 2.
 Result<Trajectory> queried_frames(const fs::path& folder, const Trajectory& reference) {
   std::error_code failure;
-  if (!fs::exists(folder / MapStore::kFileName, failure)) return reference;
-  const auto store = MapStore::open(folder / MapStore::kFileName);
+  const fs::path map = MapStore::file_of(folder);
+  if (!fs::exists(map, failure)) return reference;
+  const auto store = MapStore::open(map, MapStore::Access::kRead);
   if (!store) return store.error();
   const auto keyframes = store->keyframes();
   if (!keyframes) return keyframes.error();
@@ -96,8 +97,8 @@ Result<JudgedTrajectory> judge(const fs::path& file, const Trajectory& reference
   // By the times that the poses were written with, where the map has them.
   Stamps stamps;
   std::error_code failure;
-  if (const fs::path map = file.parent_path() / MapStore::kFileName; fs::exists(map, failure)) {
-    const auto store = MapStore::open(map);
+  if (const fs::path map = MapStore::file_of(file.parent_path()); fs::exists(map, failure)) {
+    const auto store = MapStore::open(map, MapStore::Access::kRead);
     if (!store) return store.error();
     const auto scans = store->scans();
     if (!scans) return scans.error();

@@ -2,6 +2,7 @@
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <tuple>
 
 #include <revisit/core/stopwatch.hpp>
 #include <revisit/io/pose_file.hpp>
@@ -22,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct SlamOptions {
-  std::string input, out, poses, calibration, odometry, wheels;
+  std::string input, out, into, poses, calibration, odometry, wheels;
   double sweep_s = 0.0;
   bool overwrite = false, resume = false, without_map = false;
   InputFlags recording;
@@ -47,14 +48,16 @@ Result<OtherOdometry> other_odometry(const SlamOptions& options, const Recording
   });
 }
 
-// A map is not continued with another recording.
-Status check_note(MapStore& store, const std::string& name, const std::string& value, const std::string& what) {
-  const auto noted = store.note(name);
-  if (!noted) return noted.error();
-  if (!*noted) return store.set_note(name, value);
-  if (**noted == value) return ok();
-  return Error{std::string(MapStore::kFileName) + ": was made with " + what + " '" + **noted + "', not '" + value +
-               "'"};
+// A session is not continued with another recording.
+Status check_session(const MapStore& store, const std::string& recording, const std::string& parameters) {
+  const auto sessions = store.sessions();
+  if (!sessions) return sessions.error();
+  if (sessions->empty()) return ok();
+  const StoredSession& last = sessions->back();
+  for (const auto& [what, was, is] :
+       {std::tuple{"the recording", &last.recording, &recording}, {"the parameters", &last.parameters, &parameters}})
+    if (*was != *is) return Error{store.file() + ": was made with " + what + " '" + *was + "', not '" + *is + "'"};
+  return ok();
 }
 
 // What must stay as it was when the map was begun.
@@ -69,11 +72,22 @@ std::string parameters_text(const Parameters& parameters, const SlamOptions& opt
   return text;
 }
 
+Result<std::shared_ptr<MapStore>> shared(Result<MapStore> store) {
+  if (!store) return store.error();
+  return std::make_shared<MapStore>(*std::move(store));
+}
+
 Result<std::shared_ptr<MapStore>> open_store(const SlamOptions& options) {
-  const fs::path file = fs::path(options.out) / MapStore::kFileName;
   std::error_code failure;
   fs::create_directories(options.out, failure);
   if (failure) return Error{options.out + ": cannot be created: " + failure.message()};
+  if (!options.into.empty()) {
+    const fs::path map = MapStore::file_of(options.into);
+    if (!fs::exists(map, failure))
+      return Error{map.string() + ": no such map; `revisit slam` without --into makes one"};
+    return shared(MapStore::open(map));
+  }
+  const fs::path file = MapStore::file_of(options.out);
   const bool exists = fs::exists(file, failure);
   if (exists && options.overwrite && !options.resume)
     for (const char* ending : {"", "-wal", "-shm"}) fs::remove(file.string() + ending, failure);
@@ -81,9 +95,8 @@ Result<std::shared_ptr<MapStore>> open_store(const SlamOptions& options) {
     return Error{options.out +
                  ": already holds a map; continue it with --resume, replace it with --overwrite, or name another "
                  "folder"};
-  auto store = fs::exists(file, failure) ? MapStore::open(file) : MapStore::create(file);
-  if (!store) return store.error();
-  return std::make_shared<MapStore>(*std::move(store));
+  return shared(fs::exists(file, failure) ? MapStore::open(file)
+                                          : MapStore::create(fs::path(options.out) / MapStore::kFileName));
 }
 
 void count(RunFile& run, const SlamStep& step) {
@@ -146,16 +159,26 @@ std::string to_ranges(const std::vector<std::int64_t>& frames) {
   return text;
 }
 
-Status write_rows(const MapStore& store, ResultWriter& writer) {
+// Within this session, by the frames of its recording.
+Status write_rows(const MapStore& store, int session, ResultWriter& writer) {
   const auto answers = store.answers();
   const auto edges = store.edges();
   if (!answers) return answers.error();
   if (!edges) return edges.error();
-  for (const CandidateRow& row : *answers)
+  const auto is_own = [session](FrameId frame) { return session_of(frame) == session; };
+  for (CandidateRow row : *answers) {
+    if (!is_own(row.query) || (row.match && !is_own(*row.match))) continue;
+    row.query = in_recording(row.query);
+    if (row.match) row.match = in_recording(*row.match);
     if (const Status status = writer.add(row); !status) return status;
-  for (const StoredEdge& edge : *edges)
-    if (edge.loop)
-      if (const Status status = writer.add(*edge.loop); !status) return status;
+  }
+  for (const StoredEdge& edge : *edges) {
+    if (!edge.loop || !is_own(edge.from) || !is_own(edge.to)) continue;
+    LoopConstraint loop = *edge.loop;
+    loop.query = in_recording(loop.query);
+    loop.match = in_recording(loop.match);
+    if (const Status status = writer.add(loop); !status) return status;
+  }
   return writer.finish();
 }
 
@@ -216,13 +239,17 @@ int slam(const SlamOptions& options) {
 
   const auto store = open_store(options);
   if (!store) return fail(store.error());
-  if (const Status status = check_note(**store, "input", run.input, "the recording"); !status)
-    return fail(status.error());
-  if (const Status status = check_note(**store, "parameters", parameters_text(*parameters, options), "the parameters");
-      !status)
-    return fail(status.error());
-  const auto source = options.odometry.empty() ? Odometry::Source::kLidar : Odometry::Source::kExternal;
-  auto slam = Slam::open(*store, *parameters, {*scale, *calibration, source, print_log()});
+  SlamSetup setup{*scale,
+                  *calibration,
+                  options.odometry.empty() ? Odometry::Source::kLidar : Odometry::Source::kExternal,
+                  print_log(),
+                  !options.into.empty() && !options.resume,
+                  run.input,
+                  parameters_text(*parameters, options)};
+  if (!setup.new_session)
+    if (const Status status = check_session(**store, setup.recording, setup.parameters); !status)
+      return fail(status.error());
+  auto slam = Slam::open(*store, *parameters, setup);
   if (!slam) return fail(slam.error());
 
   const fs::path out = options.out;
@@ -235,7 +262,7 @@ int slam(const SlamOptions& options) {
   run.ms_total["all"] = watch.lap_ms();
   run.counts["skipped"] = run.skipped.size();
   // What was found until here is written, whatever happened.
-  const Status rows = write_rows(**store, *writer);
+  const Status rows = write_rows(**store, slam->session(), *writer);
   const Status poses = slam->graph().keyframes().empty() ? ok() : write_trajectories(*slam, **recording, out);
   const Status map = slam->graph().keyframes().empty() || options.without_map ? ok() : write_map(*slam, out, run);
   const Status described = write_run(out / "run.json", run);
@@ -271,7 +298,7 @@ Run add_slam(CLI::App& program) {
       "  map.ply/.pcd     the map, without what moved; map.png shows it, tiles/ holds it in tiles of 50 m\n"
       "  graph.g2o        the pose graph\n"
       "  loops.csv, candidates.csv, run.json   as `revisit detect` writes them, for key frames\n"
-      "  map.sqlite       everything as it is found: an interrupted run continues with --resume\n\n"
+      "  map.revisit      everything as it is found: an interrupted run continues with --resume (docs/maps.md)\n\n"
       "Example: revisit slam kitti/sequences/00 --out maps/00\n"
       "         revisit evaluate maps/00 --reference kitti/poses/00.txt");
   command->add_option("input", options->input, "Recording, as for `revisit detect`")->required();
@@ -288,6 +315,10 @@ Run add_slam(CLI::App& program) {
           "For points without times whose distortion nobody has undone (KITTI raw): the sensor turns once in so "
           "many seconds, clockwise from above, and looks ahead at the stamp; negative: the other way round")
       ->check(CLI::Range(-1.0, 1.0));
+  command->add_option(
+      "--into", options->into,
+      "A map of before (file, or folder of --out) that this recording is added to: it is found in it by "
+      "its loops, wherever it starts");
   command->add_option("--poses", options->poses,
                       "Reference poses (KITTI, TUM, g2o), written into the results for `revisit evaluate`; never used "
                       "to track or to find loops");

@@ -19,7 +19,11 @@ namespace revisit {
   return text;
 }
 
-/// "frame 12", as messages name a scan.
-inline std::string to_text(FrameId frame) { return "frame " + std::to_string(frame.value); }
+/// "frame 12", as messages name a scan; "frame 12 of session 2" in a map of several.
+inline std::string to_text(FrameId frame) {
+  std::string text = "frame " + std::to_string(in_recording(frame).value);
+  if (session_of(frame) > 0) text += " of session " + std::to_string(session_of(frame));
+  return text;
+}
 
 }  // namespace revisit

@@ -94,7 +94,7 @@ bool is_present(const fs::path& path) {
 bool is_map_folder(const fs::path& folder) {
   std::error_code failure;
   return fs::is_regular_file(folder / "tiles" / "tiles.json", failure) ||
-         fs::is_regular_file(folder / "map.sqlite", failure);
+         fs::is_regular_file(folder / "map.revisit", failure) || fs::is_regular_file(folder / "map.sqlite", failure);
 }
 
 // Names may be times: of 13 digits and more since 1970 in milli-, micro- or nanoseconds (NCLT, ROS), or since the

@@ -50,6 +50,8 @@ class Odometry {
   void restore_map(double stamp_s, std::span<const Point> points, const Pose& T_odom_lidar);
   /// The last scan of an earlier run, and the motion since the one before, if it is known.
   void restore(double stamp_s, const Pose& T_odom_lidar, const std::optional<Twist>& motion, int segment);
+  /// Segments count from here, before the first scan.
+  void begin_at_segment(int segment) { segment_ = segment; }
   /// What the external odometry said at that last scan.
   void restore_external(const Pose& T_external_lidar);
 

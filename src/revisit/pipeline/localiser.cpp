@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include <revisit/store/sensor_facts.hpp>
 #include <revisit/store/stored_clouds.hpp>
 
 namespace revisit {
@@ -10,23 +11,29 @@ namespace revisit {
 Localiser::Localiser(SavedMap map, const Parameters& parameters, LogSink log)
     : map_(std::move(map)),
       preparation_(parameters, std::nullopt, {}, std::move(log)),
-      recognition_(parameters, clouds_in_store(map_.store())) {
-  if (const auto& sensor = map_.session().sensor) typical_ = sensor->typical;
-}
+      recognition_(parameters, clouds_in_store(map_.store())) {}
 
 Result<Localiser> Localiser::open(const std::filesystem::path& path, const Parameters& parameters, LogSink log) {
   if (const Status status = validate(parameters); !status) return status.error();
   auto map = SavedMap::open(path);
   if (!map) return map.error();
   Localiser localiser(*std::move(map), parameters, std::move(log));
-  const auto add_place = [&](const FrameTime& frame, const IntensityScanContext& descriptor,
-                             const std::optional<TrajectoryPoint>& point) {
-    localiser.recognition_.restore(frame, descriptor, point);
-  };
   const SavedMap& opened = localiser.map_;
-  if (const Status status = restore_places(*opened.store(), opened.session(), parameters.descriptor, add_place);
-      !status)
+  const auto add_place = [&](const StoredMap::Keyframe& place, const IntensityScanContext& descriptor) {
+    const FrameId frame = place.frame.frame;
+    localiser.recognition_.restore(place.frame, descriptor,
+                                   point_in_map(opened.T_map_lidar(frame), opened.part(frame)));
+  };
+  if (const Status status = restore_places(*opened.store(), opened.stored(), parameters.descriptor, add_place); !status)
     return Error{path.string() + ": " + status.error().message};
+  // What the last session knows: of several sensors, the one that was used last.
+  for (const StoredSession& session : opened.stored().sessions) {
+    const auto sensor = to_sensor_facts(session.sensor);
+    if (!sensor) return Error{path.string() + ": " + sensor.error().message};
+    if (!*sensor) continue;
+    localiser.typical_ = (*sensor)->typical;
+    localiser.recognition_.set_look_alikes((*sensor)->look_alikes_log_odds);
+  }
   return localiser;
 }
 

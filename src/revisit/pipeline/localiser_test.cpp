@@ -65,7 +65,7 @@ TEST(Localiser, SaysWhatIsWrongWithAMap) {
   ASSERT_FALSE(nowhere);
   EXPECT_NE(nowhere.error().message.find("/no/such/folder"), std::string::npos) << nowhere.error().message;
   const fs::path folder = fresh_folder();
-  std::ofstream(folder / "map.sqlite") << "this is no map";
+  std::ofstream(folder / "map.revisit") << "this is no map";
   EXPECT_FALSE(Localiser::open(folder));
   Parameters other_grid;
   other_grid.descriptor.sectors = 60;

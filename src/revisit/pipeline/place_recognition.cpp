@@ -58,7 +58,7 @@ Status PlaceRecognition::verify(const PreparedScan& query, const TypicalAgreemen
       .places = points_,
       .following = following_,
       .typical = typical,
-      .look_alikes_log_odds = look_alikes_.log_odds(),
+      .look_alikes_log_odds = look_alikes_log_odds(),
       .newest = detection.candidates.empty() ? FrameId{} : index_.frame(detection.searchable_places - 1)};
   LoopVerification verification(context, question);
   if (queries_++ % kLearnsEvery == 0 && parameters_.geometric.overhead_search)

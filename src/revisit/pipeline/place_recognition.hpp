@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <deque>
 #include <memory>
 #include <utility>
@@ -31,6 +32,9 @@ class PlaceRecognition {
                const std::optional<TrajectoryPoint>& point);
 
   const PlaceIndex& index() const { return index_; }
+  /// How much alike the places are (LookAlikes); of an earlier run where this one knows nothing yet.
+  double look_alikes_log_odds() const { return std::min(look_alikes_.log_odds(), look_alikes_before_); }
+  void set_look_alikes(double log_odds) { look_alikes_before_ = log_odds; }
 
  private:
   Status verify(const PreparedScan& query, const TypicalAgreement& typical, Detection& detection);
@@ -43,6 +47,7 @@ class PlaceRecognition {
   TrajectoryPoints points_;  ///< of all places
   LoopFollowing following_;
   LookAlikes look_alikes_;
+  double look_alikes_before_ = 0.0;
   std::size_t queries_ = 0;
   struct RecentQuery {
     FrameId frame;

@@ -31,7 +31,7 @@ Result<Slam> Slam::open(const std::filesystem::path& folder, const Parameters& p
   std::error_code failure;
   std::filesystem::create_directories(folder, failure);
   if (failure) return Error{folder.string() + ": cannot be created: " + failure.message()};
-  const std::filesystem::path file = folder / MapStore::kFileName;
+  const std::filesystem::path file = MapStore::file_of(folder);
   auto store = shared(std::filesystem::exists(file, failure) ? MapStore::open(file) : MapStore::create(file));
   if (!store) return store.error();
   return open(*std::move(store), parameters, setup);
@@ -39,25 +39,45 @@ Result<Slam> Slam::open(const std::filesystem::path& folder, const Parameters& p
 
 Result<Slam> Slam::open(std::shared_ptr<MapStore> store, const Parameters& parameters, const SlamSetup& setup) {
   Slam slam(parameters, setup, std::move(store));
-  if (const Status status = slam.restore(); !status) return status.error();
+  if (const Status status = slam.restore(setup); !status) return status.error();
   return slam;
 }
 
-Status Slam::restore() {
-  const auto session = read_session(*store_);
-  if (!session) return session.error();
-  if (session->keyframes.empty()) return ok();
-  last_frame_ = session->scans.back().frame;
-  if (const Status status = back_end_.restore(*session); !status) return status;
-  return front_end_.restore(*store_, *session);
+Status Slam::restore(const SlamSetup& setup) {
+  const auto map = read_map(*store_);
+  if (!map) return map.error();
+  StoredSession session{0, setup.recording, setup.parameters, {}};
+  const bool continues = !map->sessions.empty() && !setup.new_session;
+  if (continues)
+    session = map->sessions.back();
+  else if (!map->sessions.empty())
+    session.id = map->sessions.back().id + 1;
+  session_ = session.id;
+  if (!continues)
+    if (const Status status = store_->set(session); !status) return status;
+  if (const Status status = back_end_.restore(*map, session); !status) return status;
+  if (map->keyframes.empty()) return ok();
+  if (session_of(map->keyframes.back().frame.frame) != session_) {
+    front_end_.begin_session(map->keyframes.back().point.segment + 1);
+    return ok();
+  }
+  const auto last = store_->last_scans(1);
+  if (!last) return last.error();
+  if (!last->empty()) last_frame_ = in_recording(last->back().frame);
+  return front_end_.restore(*store_, *map);
 }
+
+bool Slam::is_joined() const { return !graph().keyframes().empty() && graph().part(graph().keyframes().back()) == 0; }
 
 Result<SlamStep> Slam::process(Scan scan, const std::optional<Pose>& T_external_lidar) {
   if (!failure_) return failure_.error();
   if (last_frame_ && scan.frame <= *last_frame_)
     return Error{to_text(scan.frame) + ": not after " + to_text(*last_frame_) + ", the last one of the map"};
+  if (!fits_into_map(scan.frame))
+    return Error{"frame " + std::to_string(scan.frame.value) + ": a map numbers frames from 0 to 2^40 - 1"};
   SlamStep step;
   step.frame = scan.frame;
+  scan.frame = in_map(session_, scan.frame);
   auto front = front_end_.step(std::move(scan), T_external_lidar);
   if (!front) return front.error();
   const OdometryStep& odometry = front->odometry;
@@ -88,8 +108,8 @@ Result<SlamStep> Slam::process(Scan scan, const std::optional<Pose>& T_external_
   const FrameId keyframe = graph().keyframes().back();
   const Pose T_keyframe_lidar = front_end_.T_keyframe_lidar(odometry);
   step.T_world_lidar = graph().T_world_lidar(keyframe) * T_keyframe_lidar;
-  failure_ = store_->add(
-      StoredScan{step.frame, keyframe, odometry.stamp_s, T_keyframe_lidar, odometry.T_odom_lidar, step.is_tracked});
+  failure_ = store_->add(StoredScan{in_map(session_, step.frame), keyframe, odometry.stamp_s, T_keyframe_lidar,
+                                    odometry.T_odom_lidar, step.is_tracked});
   if (failure_ && step.is_keyframe) failure_ = store_->commit();
   if (!failure_) return failure_.error();
   step.ms.store += watch.lap_ms();
@@ -106,10 +126,11 @@ Result<Slam::Trajectories> Slam::trajectories() const {
   if (!scans) return scans.error();
   Trajectories result;
   for (const StoredScan& scan : *scans) {
-    if (!graph().has(scan.keyframe))
-      return Error{"frame " + std::to_string(scan.frame.value) + " of the map belongs to no key frame"};
-    result.odometry.entries[scan.frame] = {scan.stamp_s, scan.T_odom_lidar};
-    result.corrected.entries[scan.frame] = {scan.stamp_s, graph().T_world_lidar(scan.keyframe) * scan.T_keyframe_lidar};
+    if (session_of(scan.frame) != session_) continue;
+    if (!graph().has(scan.keyframe)) return Error{to_text(scan.frame) + " of the map belongs to no key frame"};
+    const FrameId frame = in_recording(scan.frame);
+    result.odometry.entries[frame] = {scan.stamp_s, scan.T_odom_lidar};
+    result.corrected.entries[frame] = {scan.stamp_s, graph().T_world_lidar(scan.keyframe) * scan.T_keyframe_lidar};
   }
   return result;
 }

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <revisit/mapping/build_map.hpp>
@@ -33,6 +34,9 @@ struct SlamSetup {
   IntensityCalibration calibration = {};
   Odometry::Source odometry = Odometry::Source::kLidar;
   LogSink log = {};
+  bool new_session = false;     ///< another recording enters the map that is there; else its last one goes on
+  std::string recording = {};   ///< of a new session, as the map shall name it
+  std::string parameters = {};  ///< likewise: what must not change while it is made
 };
 
 /// Scans in; trajectory, loops and map out, online. Takes scans as a driver delivers them. Everything is kept in a
@@ -42,7 +46,7 @@ class Slam {
  public:
   /// Throws std::invalid_argument for parameters out of range.
   explicit Slam(const Parameters& parameters = {}, const SlamSetup& setup = {});
-  /// Keeps the map in `folder` (map.sqlite), and continues the one that is there.
+  /// Keeps the map in `folder` (map.revisit), and continues the one that is there, or adds a session to it.
   static Result<Slam> open(const std::filesystem::path& folder, const Parameters& parameters = {},
                            const SlamSetup& setup = {});
   /// The same with a store that was opened already.
@@ -58,13 +62,19 @@ class Slam {
   void restore_external(const Pose& T_external_lidar) { front_end_.restore_external(T_external_lidar); }
   bool has_failed() const { return !failure_; }  ///< the store has
 
+  /// The last one of this session, as its recording numbers it.
   std::optional<FrameId> last_frame() const { return last_frame_; }
+  /// Number of this session in the map. Key frames of graph() and store() carry it (in_map()).
+  int session() const { return session_; }
+  /// Whether loops join this session with the first one, or whether it waits beside it.
+  bool is_joined() const;
   const KeyframeGraph& graph() const { return back_end_.graph(); }
   const MapStore& store() const { return *store_; }
 
   struct Trajectories {
     Trajectory odometry, corrected;
   };
+  /// Of this session, by the frames of its recording.
   Result<Trajectories> trajectories() const;
   /// The map in the world's frame: a point a voxel, without what moved. Intensities in [0, 1].
   Result<std::vector<Point>> map() const;
@@ -75,7 +85,7 @@ class Slam {
 
  private:
   Slam(const Parameters& parameters, const SlamSetup& setup, Result<std::shared_ptr<MapStore>> store);
-  Status restore();
+  Status restore(const SlamSetup& setup);
   MapInput map_input() const;
 
   Parameters parameters_;
@@ -84,6 +94,7 @@ class Slam {
   SlamFrontEnd front_end_;
   SlamBackEnd back_end_;
   std::optional<FrameId> last_frame_;
+  int session_ = 0;
 };
 
 }  // namespace revisit

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/pipeline/slam_back_end.hpp>
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -46,6 +47,8 @@ Result<SlamBackEnd::Added> SlamBackEnd::add_keyframe(PreparedScan scan, const Od
                                                : graph_.last_point().to(odometry.T_odom_lidar);
   const bool starts = starts_segment(point);
   scan.trajectory_point = point;
+  const double stamp_s = scan.scan.stamp_s;
+  scan.scan.stamp_s = time_in_index({frame, stamp_s}).stamp_s;
   // The cloud is thinned for the map meanwhile, for nothing where the place turns out to be known.
   Result<Detection> detection = Error{};
   Bytes map_cloud;
@@ -73,16 +76,21 @@ Result<SlamBackEnd::Added> SlamBackEnd::add_keyframe(PreparedScan scan, const Od
   for (LoopGate::Decision& decision : graph_.decide_overdue()) decisions.push_back(std::move(decision));
   added.graph_ms = watch.lap_ms();
 
-  StoredKeyframe keyframe{frame, scan.scan.stamp_s, odometry.T_odom_lidar, starts, {}, {}, {}};
+  StoredKeyframe keyframe{frame, stamp_s, odometry.T_odom_lidar, starts, {}, {}, {}};
   if (!is_known_place) {
     keyframe.descriptor = to_bytes(scan.descriptor);
     keyframe.place = to_bytes(scan.cloud);
     keyframe.cloud = std::move(map_cloud);
   }
+  SensorFacts known = sensor;
+  known.look_alikes_log_odds = recognition_.look_alikes_log_odds();
   Status stored = store_->add(keyframe);
   if (stored && edge) stored = store_->add(*edge);
   if (stored && detection && detection->searchable_places > 0) stored = store_->add(detection->row());
-  if (stored) stored = write_sensor_facts(*store_, sensor);
+  if (std::string facts = to_text(known); stored && facts != session_.sensor) {
+    session_.sensor = std::move(facts);
+    stored = store_->set(session_);
+  }
   if (stored) stored = enter(decisions, added.loops_entered);
   if (stored && !is_known_place) stored = recognition_.add(std::move(scan));
   if (!stored) return stored.error();
@@ -106,7 +114,8 @@ Result<Detection> SlamBackEnd::find_loop(const PreparedScan& keyframe, const Sen
       starts_segment(*keyframe.trajectory_point) ? std::optional(graph_.keyframes().back()) : graph_.last_attached();
   const PlaceIndex& index = recognition_.index();
   const FrameTime frame{keyframe.scan.frame, keyframe.scan.stamp_s};
-  const std::size_t places = last_attached ? index.until(*last_attached) : index.searchable(frame);
+  const std::size_t old_enough = index.searchable(frame);
+  const std::size_t places = last_attached ? std::max(index.until(*last_attached), old_enough) : old_enough;
   auto detection = recognition_.find(keyframe, places, sensor.typical);
   // A place that cannot be read gives no loop; the key frame is one all the same.
   if (!detection)
@@ -127,7 +136,7 @@ Status SlamBackEnd::enter(const std::vector<LoopGate::Decision>& decisions, std:
     LoopConstraint loop = decision.loop;
     if (!decision.enters) {
       log_to(log_, LogLevel::kInfo,
-             "the loop from " + to_text(loop.query) + " to " + std::to_string(loop.match.value) +
+             "the loop from " + to_text(loop.query) + " to " + to_text(loop.match) +
                  " stays out of the graph: no other one agrees with it, or one that entered contradicts it");
       continue;
     }
@@ -137,8 +146,7 @@ Status SlamBackEnd::enter(const std::vector<LoopGate::Decision>& decisions, std:
     const StoredEdge edge{loop.match, loop.query, loop.T_match_query, loop.information, loop};
     if (const Status status = store_->add(edge); !status) return status;
     if (attaches)
-      log_to(log_, LogLevel::kInfo,
-             to_text(loop.query) + ": found again in the map, at frame " + std::to_string(loop.match.value));
+      log_to(log_, LogLevel::kInfo, to_text(loop.query) + ": found again in the map, at " + to_text(loop.match));
   }
   return ok();
 }
@@ -146,18 +154,44 @@ Status SlamBackEnd::enter(const std::vector<LoopGate::Decision>& decisions, std:
 Status SlamBackEnd::finish() {
   std::size_t entered = 0;
   const Status stored = enter(graph_.decide_all(), entered);
-  const Status settled = graph_.settle(), committed = store_->commit();
-  for (const Status* each : {&stored, &settled})
+  const Status settled = graph_.settle();
+  const Status placed = stored && settled ? write_map_poses() : ok();
+  const Status committed = store_->commit();
+  for (const Status* each : {&stored, &settled, &placed})
     if (!*each) return *each;
   return committed;
 }
 
-Status SlamBackEnd::restore(const StoredSession& session) {
-  if (const Status status = restore_graph(session, graph_); !status) return status;
-  return restore_places(
-      *store_, session, parameters_.descriptor,
-      [this](const FrameTime& frame, const IntensityScanContext& descriptor,
-             const std::optional<TrajectoryPoint>& point) { recognition_.restore(frame, descriptor, point); });
+Status SlamBackEnd::write_map_poses() {
+  std::vector<StoredMapPose> poses;
+  poses.reserve(graph_.keyframes().size());
+  for (const FrameId frame : graph_.keyframes())
+    poses.push_back({frame, graph_.T_world_lidar(frame), graph_.part(frame)});
+  return store_->set_map_poses(poses);
+}
+
+FrameTime SlamBackEnd::time_in_index(const FrameTime& frame) {
+  constexpr double kBetweenSessions_s = 1e4;
+  if (const int session = session_of(frame.frame); session != newest_session_) {
+    stamp_shift_s_ = newest_session_ < 0 ? 0.0 : newest_stamp_s_ + kBetweenSessions_s - frame.stamp_s;
+    newest_session_ = session;
+  }
+  newest_stamp_s_ = std::max(newest_stamp_s_, frame.stamp_s + stamp_shift_s_);
+  return {frame.frame, frame.stamp_s + stamp_shift_s_};
+}
+
+Status SlamBackEnd::restore(const StoredMap& map, const StoredSession& session) {
+  session_ = session;
+  if (map.keyframes.empty()) return ok();
+  if (const Status status = restore_graph(map, graph_); !status) return status;
+  return restore_places(*store_, map, parameters_.descriptor,
+                        [this](const StoredMap::Keyframe& each, const IntensityScanContext& descriptor) {
+                          const FrameId frame = each.frame.frame;
+                          const bool is_earlier = session_of(frame) != session_.id;
+                          recognition_.restore(
+                              time_in_index(each.frame), descriptor,
+                              is_earlier ? point_in_map(graph_.T_world_lidar(frame), graph_.part(frame)) : each.point);
+                        });
 }
 
 }  // namespace revisit

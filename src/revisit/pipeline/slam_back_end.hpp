@@ -8,7 +8,8 @@
 #include <revisit/pipeline/detection.hpp>
 #include <revisit/pipeline/place_recognition.hpp>
 #include <revisit/pose_graph/keyframe_graph.hpp>
-#include <revisit/store/stored_session.hpp>
+#include <revisit/store/sensor_facts.hpp>
+#include <revisit/store/stored_map.hpp>
 
 namespace revisit {
 
@@ -27,7 +28,8 @@ class SlamBackEnd {
   Result<Added> add_keyframe(PreparedScan scan, const OdometryStep& odometry, const SensorFacts& sensor);
   /// Decides about loops that wait for others, and settles the graph.
   Status finish();
-  Status restore(const StoredSession& session);
+  /// The map of before; `session` is the one that this run adds or continues.
+  Status restore(const StoredMap& map, const StoredSession& session);
 
   const KeyframeGraph& graph() const { return graph_; }
 
@@ -35,14 +37,21 @@ class SlamBackEnd {
   bool starts_segment(const TrajectoryPoint& point) const;
   Result<Detection> find_loop(const PreparedScan& keyframe, const SensorFacts& sensor);
   KeyframeGraph::OdometryEdge edge_to(const TrajectoryPoint& point, const Matrix6& information) const;
+  Status write_map_poses();
   Status enter(const std::vector<LoopGate::Decision>& decisions, std::size_t& entered);
 
+  FrameTime time_in_index(const FrameTime& frame);
+
+  StoredSession session_;
   Parameters parameters_;
   Odometry::Source source_;
   std::shared_ptr<MapStore> store_;
   LogSink log_;
   PlaceRecognition recognition_;
   KeyframeGraph graph_;
+  // Sessions have clocks of their own: in the index each begins long after the one before.
+  int newest_session_ = -1;
+  double stamp_shift_s_ = 0.0, newest_stamp_s_ = 0.0;
 };
 
 }  // namespace revisit

@@ -88,13 +88,15 @@ void SlamFrontEnd::report(FrameId frame, const OdometryStep& odometry) const {
                ": tracking is lost; a new segment of the trajectory begins, until its place in the map is found");
 }
 
-Status SlamFrontEnd::restore(const MapStore& store, const StoredSession& session) {
-  if (session.sensor) {
-    typical_.restore(session.sensor->typical, session.sensor->typical_pairs);
-    preparation_.set_intensity_scale(session.sensor->intensity_scale);
+Status SlamFrontEnd::restore(const MapStore& store, const StoredMap& map) {
+  const auto sensor = to_sensor_facts(map.sessions.back().sensor);
+  if (!sensor) return sensor.error();
+  if (*sensor) {
+    typical_.restore((*sensor)->typical, (*sensor)->typical_pairs);
+    preparation_.set_intensity_scale((*sensor)->intensity_scale);
   }
-  keyframe_segment_ = session.keyframes.back().point.segment;
-  return restore_odometry(store, session, odometry_, selection_);
+  keyframe_segment_ = map.keyframes.back().point.segment;
+  return restore_odometry(store, map, odometry_, selection_);
 }
 
 }  // namespace revisit

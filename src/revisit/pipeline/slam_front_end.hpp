@@ -7,7 +7,8 @@
 #include <revisit/odometry/keyframe_selection.hpp>
 #include <revisit/odometry/odometry.hpp>
 #include <revisit/pipeline/prepare.hpp>
-#include <revisit/store/stored_session.hpp>
+#include <revisit/store/sensor_facts.hpp>
+#include <revisit/store/stored_map.hpp>
 #include <revisit/verification/typical_agreement.hpp>
 
 namespace revisit {
@@ -35,8 +36,11 @@ class SlamFrontEnd {
   Pose T_keyframe_lidar(const OdometryStep& odometry) const {
     return selection_.T_odom_last().inverse() * odometry.T_odom_lidar;
   }
-  SensorFacts sensor() const { return {preparation_.intensity_scale(), typical_.overall(), typical_.pairs()}; }
-  Status restore(const MapStore& store, const StoredSession& session);
+  SensorFacts sensor() const { return {preparation_.intensity_scale(), typical_.overall(), typical_.pairs(), 0.0}; }
+  /// Goes on where the last session of the map ended.
+  Status restore(const MapStore& store, const StoredMap& map);
+  /// Begins a new session; segments count on from this one.
+  void begin_session(int first_segment) { odometry_.begin_at_segment(first_segment); }
   void restore_external(const Pose& T_external_lidar) { odometry_.restore_external(T_external_lidar); }
 
  private:

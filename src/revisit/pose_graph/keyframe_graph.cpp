@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/pose_graph/keyframe_graph.hpp>
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace revisit {
@@ -10,12 +11,13 @@ constexpr std::size_t kSettleEvery_keyframes = 20;  // docs/slam.md, "Loops into
 
 }  // namespace
 
-void KeyframeGraph::add_keyframe(FrameId frame, const TrajectoryPoint& point, const std::optional<OdometryEdge>& edge) {
+void KeyframeGraph::add_keyframe(FrameId frame, const TrajectoryPoint& point, const std::optional<OdometryEdge>& edge,
+                                 const std::optional<Pose>& T_world_lidar) {
   if (keyframes_.empty() == edge.has_value())
     throw std::invalid_argument("the first key frame has no edge from the last one, and every other one has");
   gate_.add_keyframe(frame, point);
-  const std::size_t node =
-      graph_.add_node(edge ? normalised(graph_.nodes().back() * edge->T_last_new) : Pose(Pose::Identity()));
+  const Pose T_by_odometry = edge ? normalised(graph_.nodes().back() * edge->T_last_new) : Pose(Pose::Identity());
+  const std::size_t node = graph_.add_node(T_world_lidar ? *T_world_lidar : T_by_odometry);
   if (edge) {
     graph_.add_edge({node - 1, node, edge->T_last_new, edge->information});
     if (point.segment != last_point_.segment) last_attached_ = keyframes_.back();
@@ -26,7 +28,22 @@ void KeyframeGraph::add_keyframe(FrameId frame, const TrajectoryPoint& point, co
   ++keyframes_unsettled_;
 }
 
+// The gate still counts them as apart.
+void KeyframeGraph::bring_together(const LoopConstraint& loop) {
+  const int match_part = gate_.part(loop.match), query_part = gate_.part(loop.query);
+  if (match_part == query_part) return;
+  const Pose &T_world_match = T_world_lidar(loop.match), &T_world_query = T_world_lidar(loop.query);
+  const Pose T_new_old = query_part > match_part
+                             ? T_world_match * loop.T_match_query * T_world_query.inverse()
+                             : T_world_query * loop.T_match_query.inverse() * T_world_match.inverse();
+  const int moving = std::max(match_part, query_part);
+  for (std::size_t node = 0; node < keyframes_.size(); ++node)
+    if (gate_.part(keyframes_[node]) == moving) graph_.move_node(node, normalised(T_new_old * graph_.nodes()[node]));
+}
+
 bool KeyframeGraph::add_loop(const LoopConstraint& loop) {
+  bring_together(loop);
+  gate_.join(loop);
   graph_.add_edge({node_of_.at(loop.match), node_of_.at(loop.query), loop.T_match_query, loop.information, true});
   ++loops_unsettled_;
   const bool attaches = last_attached_ && loop.match <= *last_attached_ && *last_attached_ < loop.query;
@@ -34,9 +51,11 @@ bool KeyframeGraph::add_loop(const LoopConstraint& loop) {
   return attaches;
 }
 
-void KeyframeGraph::restore_loop(const LoopConstraint& loop) {
+void KeyframeGraph::restore_loop(const LoopConstraint& loop, bool is_settled) {
+  if (is_settled) gate_.join(loop);  // nothing is to be moved
   add_loop(loop);
   gate_.restore(loop);
+  if (is_settled) loops_unsettled_ = 0;
 }
 
 Status KeyframeGraph::settle_if_due() {

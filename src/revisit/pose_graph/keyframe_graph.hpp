@@ -22,17 +22,19 @@ class KeyframeGraph {
     Matrix6 information = Matrix6::Identity();
   };
   /// The first key frame is the origin of the world; every later one has an edge. A point on another segment than the
-  /// last one's begins a segment that is not yet attached to the map.
-  void add_keyframe(FrameId frame, const TrajectoryPoint& point, const std::optional<OdometryEdge>& edge);
+  /// last one's begins a segment that is not yet attached to the map. `T_world_lidar`: where it is, if that is known.
+  void add_keyframe(FrameId frame, const TrajectoryPoint& point, const std::optional<OdometryEdge>& edge,
+                    const std::optional<Pose>& T_world_lidar = std::nullopt);
 
   /// Hands a loop between two key frames, of which the query may be the newest of all, to the gate.
   std::vector<LoopGate::Decision> offer(const LoopConstraint& loop) { return gate_.offer(loop); }
   std::vector<LoopGate::Decision> decide_overdue() { return gate_.decide_overdue(); }
   std::vector<LoopGate::Decision> decide_all() { return gate_.decide_all(); }
-  /// Adds a loop that the gate let in. True where it attaches the newest segment to the map.
+  /// Adds a loop that the gate let in. True where it attaches the newest segment to the map. Of two parts that it
+  /// joins, the later one moves to where the loop has it.
   bool add_loop(const LoopConstraint& loop);
-  /// A loop that entered in an earlier run.
-  void restore_loop(const LoopConstraint& loop);
+  /// A loop that entered in an earlier run; `is_settled`: the key frames are where it has them.
+  void restore_loop(const LoopConstraint& loop, bool is_settled);
 
   /// Moves the key frames to where all edges agree best: at the latest after 20 key frames with loops among them.
   Status settle_if_due();
@@ -42,6 +44,10 @@ class KeyframeGraph {
   bool has(FrameId frame) const { return node_of_.contains(frame); }
   const Pose& T_world_lidar(FrameId keyframe) const { return graph_.nodes()[node_of_.at(keyframe)]; }
   const std::vector<FrameId>& keyframes() const { return keyframes_; }  ///< by node of the graph
+  bool is_settled() const { return loops_unsettled_ == 0; }
+  /// Which part of the map a key frame is in: between parts there is no loop, and their coordinates are not related.
+  /// The number is that of the part's first segment.
+  int part(FrameId keyframe) const { return gate_.part(keyframe); }
   const PoseGraph& graph() const { return graph_; }
   const TrajectoryPoint& last_point() const { return last_point_; }
   /// While the newest segment is not attached: the last key frame before it.
@@ -49,6 +55,7 @@ class KeyframeGraph {
 
  private:
   Status optimise(double settled);
+  void bring_together(const LoopConstraint& loop);
 
   PoseGraph graph_;
   LoopGate gate_;

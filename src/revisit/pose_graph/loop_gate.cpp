@@ -14,6 +14,10 @@ struct Consistency {
   static constexpr double kTolerance_m = 0.5, kTolerance_mAMetre = 0.02;
   static constexpr double kTolerance_deg = 3.0, kTolerance_degAMetre = 0.05;
   static constexpr double kSureAlone = 0.999;  ///< probability at which a loop needs no other
+  // To join sessions, these must agree, with queries and matches over so much travelled distance: rows of like houses
+  // and aisles are shorter, or show their ends.
+  static constexpr std::size_t kFewestToJoin = 6;
+  static constexpr double kLengthToJoin_m = 20.0;
 };
 
 }  // namespace
@@ -47,8 +51,38 @@ LoopGate::Verdict LoopGate::compare(const LoopConstraint& a, const LoopConstrain
   return agrees ? Verdict::kAgree : Verdict::kContradict;
 }
 
+int LoopGate::root(int segment) const {
+  for (auto it = joined_.find(segment); it != joined_.end(); it = joined_.find(segment)) segment = it->second;
+  return segment;
+}
+
+int LoopGate::part(FrameId keyframe) const { return root(at(keyframe).segment); }
+
+void LoopGate::join(const LoopConstraint& loop) {
+  const int match = part(loop.match), query = part(loop.query);
+  if (match != query) joined_[std::max(match, query)] = std::min(match, query);
+}
+
+bool LoopGate::joins_sessions(const LoopConstraint& loop) const {
+  return session_of(loop.match) != session_of(loop.query) && part(loop.match) != part(loop.query);
+}
+
+bool LoopGate::may_join(const LoopConstraint& loop, const std::vector<const LoopConstraint*>& agreeing) const {
+  if (agreeing.size() + 1 < Consistency::kFewestToJoin) return false;
+  double queries_m = 0.0, matches_m = 0.0;
+  for (const LoopConstraint* a : agreeing)
+    for (const LoopConstraint* b : agreeing) {
+      queries_m = std::max(queries_m, travelled_between_m(at(a->query), at(b->query)).value_or(0.0));
+      matches_m = std::max(matches_m, travelled_between_m(at(a->match), at(b->match)).value_or(0.0));
+    }
+  const bool is_contradicted = std::any_of(waiting_.begin(), waiting_.end(), [&](const LoopConstraint& other) {
+    return compare(loop, other) == Verdict::kContradict;
+  });
+  return !is_contradicted && std::min(queries_m, matches_m) >= Consistency::kLengthToJoin_m;
+}
+
 LoopGate::Decision LoopGate::decide_alone(const LoopConstraint& loop) const {
-  Decision decision{loop, loop.probability >= Consistency::kSureAlone, 0};
+  Decision decision{loop, loop.probability >= Consistency::kSureAlone && !joins_sessions(loop), 0};
   for (const LoopConstraint& other : entered_)
     if (compare(loop, other) == Verdict::kContradict) decision.enters = false;
   return decision;
@@ -58,23 +92,26 @@ std::vector<LoopGate::Decision> LoopGate::offer(const LoopConstraint& loop) {
   std::vector<Decision> decisions;
   Decision own{loop, false, 0};
   for (const LoopConstraint& other : entered_) own.agreeing += compare(loop, other) == Verdict::kAgree;
+  std::vector<const LoopConstraint*> agreeing;
+  for (const LoopConstraint& other : waiting_)
+    if (compare(loop, other) == Verdict::kAgree) agreeing.push_back(&other);
+  own.agreeing += agreeing.size();
+  own.enters = own.agreeing > 0 && (!joins_sessions(loop) || may_join(loop, agreeing));
+  if (!own.enters) {
+    waiting_.push_back(loop);
+    return decisions;
+  }
   for (auto it = waiting_.begin(); it != waiting_.end();) {
     if (compare(loop, *it) != Verdict::kAgree) {
       ++it;
       continue;
     }
-    ++own.agreeing;
     entered_.push_back(*it);
     decisions.push_back({*it, true, 1});
     it = waiting_.erase(it);
   }
-  own.enters = own.agreeing > 0;
-  if (own.enters) {
-    entered_.push_back(loop);
-    decisions.push_back(own);
-  } else {
-    waiting_.push_back(loop);
-  }
+  entered_.push_back(loop);
+  decisions.push_back(own);
   return decisions;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <vector>
 
 #include <revisit/core/loop.hpp>
@@ -11,7 +12,8 @@ namespace revisit {
 
 /// Pairwise consistency (Mangelson et al., ICRA 2018): two loops close a circle with the odometry between their ends.
 /// An accepted loop enters the graph once another one near it agrees; one that stays alone must be very sure, and no
-/// loop that entered may contradict it. Belongs to one thread at a time.
+/// loop that entered may contradict it. Between sessions that nothing joins yet, more of them must agree, over more of
+/// the trajectory: a wrong join is the worst error there is. Belongs to one thread at a time.
 class LoopGate {
  public:
   /// A key frame as odometry alone places it. Frames increase; otherwise std::invalid_argument.
@@ -26,6 +28,10 @@ class LoopGate {
   std::vector<Decision> offer(const LoopConstraint& loop);
   /// A loop that entered in an earlier run.
   void restore(const LoopConstraint& loop) { entered_.push_back(loop); }
+  /// The part of the map that a key frame is in: segments that loops join, by the number of the first of them.
+  int part(FrameId keyframe) const;
+  /// The loop is in the graph: it joins the parts of its ends.
+  void join(const LoopConstraint& loop);
   /// Decides about the loops that nothing can confirm any more, because the newest key frame is too far from them.
   std::vector<Decision> decide_overdue();
   /// Decides about all that wait: no more will come.
@@ -40,12 +46,16 @@ class LoopGate {
   const TrajectoryPoint& at(FrameId frame) const;
   Verdict compare(const LoopConstraint& a, const LoopConstraint& b) const;
   bool is_overdue(const LoopConstraint& loop) const;
+  bool joins_sessions(const LoopConstraint& loop) const;
+  bool may_join(const LoopConstraint& loop, const std::vector<const LoopConstraint*>& agreeing) const;
+  int root(int segment) const;
   Decision decide_alone(const LoopConstraint& loop) const;
   template <typename IsDue>
   std::vector<Decision> decide(IsDue is_due);
 
   std::vector<Keyframe> keyframes_;
   std::vector<LoopConstraint> entered_, waiting_;
+  std::map<int, int> joined_;  ///< segments to an earlier one of their part
 };
 
 }  // namespace revisit

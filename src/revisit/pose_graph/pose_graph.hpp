@@ -26,6 +26,8 @@ class PoseGraph {
  public:
   /// The node's number. `T_world_node`: where it is believed to be.
   std::size_t add_node(const Pose& T_world_node);
+  /// Where it is believed to be, anew.
+  void move_node(std::size_t node, const Pose& T_world_node) { nodes_.at(node) = T_world_node; }
   /// Throws std::invalid_argument for nodes that are not there, a node with itself, or an information that is not
   /// finite and symmetric.
   void add_edge(const PoseEdge& edge);

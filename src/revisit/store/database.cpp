@@ -47,6 +47,11 @@ bool Statement::step() {
   return code == SQLITE_ROW;
 }
 
+void Statement::reset() {
+  if (statement_) sqlite3_reset(handle());
+  next_ = 1;
+}
+
 Status Statement::run() {
   while (step()) {
   }

@@ -4,26 +4,16 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
+#include <revisit/core/text.hpp>
 #include <revisit/store/internal/database.hpp>
+#include <revisit/store/internal/map_schema.hpp>
 
 namespace revisit {
 namespace {
 
 using store_internal::Statement;
-
-constexpr int kApplication = 0x52565354, kVersion = 2;
-constexpr const char* kSchema = R"(
-CREATE TABLE notes(name TEXT PRIMARY KEY, text TEXT NOT NULL);
-CREATE TABLE keyframes(frame INTEGER PRIMARY KEY, stamp_s REAL NOT NULL, T_odom_lidar BLOB NOT NULL,
-  starts_anew INTEGER NOT NULL, descriptor BLOB NOT NULL, place BLOB NOT NULL, cloud BLOB NOT NULL);
-CREATE TABLE scans(frame INTEGER PRIMARY KEY, keyframe INTEGER NOT NULL, stamp_s REAL NOT NULL,
-  T_keyframe_lidar BLOB NOT NULL, T_odom_lidar BLOB NOT NULL, is_tracked INTEGER NOT NULL);
-CREATE TABLE edges(id INTEGER PRIMARY KEY, from_frame INTEGER NOT NULL, to_frame INTEGER NOT NULL,
-  T_from_to BLOB NOT NULL, information BLOB NOT NULL, score REAL, inlier_ratio REAL, rmse_m REAL, probability REAL);
-CREATE TABLE answers(query INTEGER PRIMARY KEY, match INTEGER, score REAL NOT NULL, accepted INTEGER NOT NULL,
-  reason TEXT NOT NULL);
-)";
 
 std::span<const std::byte> bytes_of(const Matrix6& matrix) { return std::as_bytes(std::span(matrix.data(), 36)); }
 
@@ -82,20 +72,45 @@ struct MapStore::Database {
     const int code = sqlite3_open_v2(path.c_str(), &handle, flags, nullptr);
     database->handle.reset(handle);
     if (code != SQLITE_OK) return Error{path.string() + ": cannot be opened as a map: " + sqlite3_errstr(code)};
+    constexpr int kPatience_ms = 2000;  // with another program that writes at the moment
+    sqlite3_busy_timeout(handle, kPatience_ms);
+    if (const Status status = store_internal::add_checksum_function(handle, database->file); !status)
+      return status.error();
     return database;
   }
   // A commit is with the system when it returns: it survives the end of the program, whatever ends it.
-  Status journal() const {
+  Status journal() {
+    writes = true;
     for (const char* sql : {"PRAGMA journal_mode=WAL", "PRAGMA synchronous=NORMAL", "PRAGMA cache_size=-8000"})
       if (const Status status = run(sql); !status) return status;
     return ok();
   }
+  // A map that nobody writes is one file, which may be copied, and read where nothing can be written.
+  ~Database() {
+    if (writes && handle && !is_in_transaction()) (void)run("PRAGMA journal_mode=DELETE");
+  }
+  bool writes = false;
+
+  Database() = default;
+  Database(const Database&) = delete;
+  Database& operator=(const Database&) = delete;
 };
 
 MapStore::MapStore(std::unique_ptr<Database> database) : database_(std::move(database)) {}
 MapStore::MapStore(MapStore&&) noexcept = default;
 MapStore& MapStore::operator=(MapStore&&) noexcept = default;
 MapStore::~MapStore() = default;
+
+std::filesystem::path MapStore::file_of(const std::filesystem::path& path) {
+  std::error_code failure;
+  if (!std::filesystem::is_directory(path, failure)) return path;
+  constexpr const char* kNameOfVersion2 = "map.sqlite";
+  const bool is_old =
+      !std::filesystem::exists(path / kFileName, failure) && std::filesystem::exists(path / kNameOfVersion2, failure);
+  return path / (is_old ? kNameOfVersion2 : kFileName);
+}
+
+const std::string& MapStore::file() const { return database_->file; }
 
 // SQLite takes an empty name for a temporary file that goes with its handle.
 Result<MapStore> MapStore::create_temporary() { return create({}); }
@@ -106,29 +121,30 @@ Result<MapStore> MapStore::create(const std::filesystem::path& file) {
   auto database = Database::connect(file, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
   if (!database) return database.error();
   if (const Status status = (*database)->journal(); !status) return status.error();
-  const std::string sql = "BEGIN;" + std::string(kSchema) + "PRAGMA application_id=" + std::to_string(kApplication) +
-                          ";PRAGMA user_version=" + std::to_string(kVersion) + ";COMMIT;";
-  if (sqlite3_exec((*database)->handle.get(), sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK)
-    return Error{file.string() + ": " + sqlite3_errmsg((*database)->handle.get())};
+  if (const Status status = store_internal::create_schema((*database)->handle.get(), file.string()); !status)
+    return status.error();
   return MapStore(*std::move(database));
 }
 
-Result<MapStore> MapStore::open(const std::filesystem::path& file) {
-  auto database = Database::connect(file, SQLITE_OPEN_READWRITE);
+Result<MapStore> MapStore::open(const std::filesystem::path& file, Access access) {
+  auto database = Database::connect(file, access == Access::kRead ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE);
   if (!database) return database.error();
-  const auto number = [&](const char* sql) -> Result<std::int64_t> {
-    Statement statement = (*database)->prepare(sql);
-    const bool found = statement.step();
-    if (!found) return statement.status() ? Error{file.string() + ": is no map"} : statement.status().error();
-    return statement.integer(0);
-  };
-  const auto application = number("PRAGMA application_id"), version = number("PRAGMA user_version");
-  for (const auto* each : {&application, &version})
-    if (!*each) return each->error();
-  if (*application != kApplication) return Error{file.string() + ": is an SQLite file, but no map of revisit"};
-  if (*version != kVersion)
-    return Error{file.string() + ": is a map of version " + std::to_string(*version) + "; this program reads version " +
-                 std::to_string(kVersion)};
+  sqlite3* const handle = (*database)->handle.get();
+  if (const Status status = store_internal::check_length(file.string()); !status) return status.error();
+  const auto version = store_internal::version_of(handle, file.string());
+  if (!version) return version.error();
+  if (*version == store_internal::kVersion) {
+    if (access == Access::kWrite)
+      if (const Status status = (*database)->journal(); !status) return status.error();
+    return MapStore(*std::move(database));
+  }
+  if (access == Access::kRead) {
+    if (const auto upgraded = open(file, Access::kWrite); !upgraded)
+      return Error{file.string() + ": is a map of version " + std::to_string(*version) +
+                   ", which cannot be upgraded: " + upgraded.error().message};
+    return open(file, access);
+  }
+  if (const Status status = store_internal::upgrade(handle, file.string(), *version); !status) return status.error();
   if (const Status status = (*database)->journal(); !status) return status.error();
   return MapStore(*std::move(database));
 }
@@ -136,21 +152,27 @@ Result<MapStore> MapStore::open(const std::filesystem::path& file) {
 Status MapStore::add(const StoredKeyframe& keyframe) {
   if (const Status begun = database_->begin(); !begun) return begun;
   const auto pose = numbers_of(keyframe.T_odom_lidar);
-  return database_->prepare("INSERT INTO keyframes VALUES(?,?,?,?,?,?,?)")
-      .bind(keyframe.frame.value)
-      .bind(keyframe.stamp_s)
-      .bind(std::as_bytes(std::span(pose)))
-      .bind(std::int64_t{keyframe.starts_segment})
-      .bind(keyframe.descriptor)
-      .bind(keyframe.place)
-      .bind(keyframe.cloud)
-      .run();
+  const Status added = database_->prepare("INSERT INTO keyframes VALUES(?1,?2,?3,?4,checksum(?1,?2,?3,?4))")
+                           .bind(keyframe.frame.value)
+                           .bind(keyframe.stamp_s)
+                           .bind(std::as_bytes(std::span(pose)))
+                           .bind(std::int64_t{keyframe.starts_segment})
+                           .run();
+  if (!added) return added;
+  for (const auto& [sql, bytes] :
+       {std::pair{"INSERT INTO descriptors VALUES(?1,?2,checksum(?1,?2))", &keyframe.descriptor},
+        {"INSERT INTO places VALUES(?1,?2,checksum(?1,?2))", &keyframe.place},
+        {"INSERT INTO clouds VALUES(?1,?2,checksum(?1,?2))", &keyframe.cloud}})
+    if (!bytes->empty())
+      if (const Status status = database_->prepare(sql).bind(keyframe.frame.value).bind(*bytes).run(); !status)
+        return status;
+  return ok();
 }
 
 Status MapStore::add(const StoredScan& scan) {
   if (const Status begun = database_->begin(); !begun) return begun;
   const auto from_keyframe = numbers_of(scan.T_keyframe_lidar), from_odom = numbers_of(scan.T_odom_lidar);
-  return database_->prepare("INSERT INTO scans VALUES(?,?,?,?,?,?)")
+  return database_->prepare("INSERT INTO scans VALUES(?1,?2,?3,?4,?5,?6,checksum(?1,?2,?3,?4,?5,?6))")
       .bind(scan.frame.value)
       .bind(scan.keyframe.value)
       .bind(scan.stamp_s)
@@ -166,8 +188,8 @@ Status MapStore::add(const StoredEdge& edge) {
   std::array<std::optional<double>, 4> of_loop{};
   if (edge.loop) of_loop = {edge.loop->score, edge.loop->inlier_ratio, edge.loop->rmse_m, edge.loop->probability};
   Statement statement = database_->prepare(
-      "INSERT INTO edges(from_frame,to_frame,T_from_to,information,score,inlier_ratio,rmse_m,probability) "
-      "VALUES(?,?,?,?,?,?,?,?)");
+      "INSERT INTO edges(from_frame,to_frame,T_from_to,information,score,inlier_ratio,rmse_m,probability,sum) "
+      "VALUES(?1,?2,?3,?4,?5,?6,?7,?8,checksum(?1,?2,?3,?4,?5,?6,?7,?8))");
   statement.bind(edge.from.value).bind(edge.to.value).bind(std::as_bytes(std::span(pose)));
   statement.bind(bytes_of(edge.information));
   for (const auto& value : of_loop) statement.bind(value);
@@ -189,6 +211,30 @@ Status MapStore::commit() { return database_->is_in_transaction() ? database_->r
 
 Status MapStore::roll_back() { return database_->is_in_transaction() ? database_->run("ROLLBACK") : ok(); }
 
+Status MapStore::set(const StoredSession& session) {
+  if (const Status begun = database_->begin(); !begun) return begun;
+  return database_->prepare("INSERT OR REPLACE INTO sessions VALUES(?1,?2,?3,?4,checksum(?1,?2,?3,?4))")
+      .bind(std::int64_t{session.id})
+      .bind(session.recording)
+      .bind(session.parameters)
+      .bind(session.sensor)
+      .run();
+}
+
+Status MapStore::set_map_poses(std::span<const StoredMapPose> poses) {
+  if (const Status begun = database_->begin(); !begun) return begun;
+  if (const Status status = database_->run("DELETE FROM map_poses"); !status) return status;
+  Statement statement = database_->prepare("INSERT INTO map_poses VALUES(?1,?2,?3,checksum(?1,?2,?3))");
+  for (const StoredMapPose& each : poses) {
+    const auto pose = numbers_of(each.T_map_lidar);
+    const Status status =
+        statement.bind(each.keyframe.value).bind(std::as_bytes(std::span(pose))).bind(std::int64_t{each.part}).run();
+    if (!status) return status;
+    statement.reset();
+  }
+  return ok();
+}
+
 Status MapStore::set_note(const std::string& name, const std::string& text) {
   if (const Status begun = database_->begin(); !begun) return begun;
   return database_->prepare("INSERT OR REPLACE INTO notes VALUES(?,?)").bind(name).bind(text).run();
@@ -201,26 +247,59 @@ Result<std::optional<std::string>> MapStore::note(const std::string& name) const
   return std::optional<std::string>();
 }
 
+Result<std::vector<StoredSession>> MapStore::sessions() const {
+  std::vector<StoredSession> rows;
+  Statement statement = database_->prepare(
+      "SELECT id,recording,parameters,sensor,sum=checksum(id,recording,parameters,sensor) FROM sessions ORDER BY id");
+  while (statement.step()) {
+    if (statement.integer(4) == 0) return database_->damaged("sessions", statement.integer(0));
+    rows.push_back({static_cast<int>(statement.integer(0)), statement.text(1), statement.text(2), statement.text(3)});
+  }
+  if (const Status status = statement.status(); !status) return status.error();
+  return rows;
+}
+
+Result<std::vector<StoredMapPose>> MapStore::map_poses() const {
+  std::vector<StoredMapPose> rows;
+  Statement statement = database_->prepare(
+      "SELECT frame,T_map_lidar,part,sum=checksum(frame,T_map_lidar,part) FROM map_poses ORDER BY frame");
+  while (statement.step()) {
+    const auto pose = to_pose(statement.bytes(1));
+    if (!pose || statement.integer(3) == 0) return database_->damaged("map poses", statement.integer(0));
+    rows.push_back({{statement.integer(0)}, *pose, static_cast<int>(statement.integer(2))});
+  }
+  if (const Status status = statement.status(); !status) return status.error();
+  return rows;
+}
+
 Result<std::vector<StoredKeyframe>> MapStore::keyframes() const {
   std::vector<StoredKeyframe> rows;
-  Statement statement =
-      database_->prepare("SELECT frame,stamp_s,T_odom_lidar,starts_anew FROM keyframes ORDER BY frame");
+  Statement statement = database_->prepare(
+      "SELECT frame,stamp_s,T_odom_lidar,starts_anew,sum=checksum(frame,stamp_s,T_odom_lidar,starts_anew) FROM "
+      "keyframes ORDER BY frame");
   while (statement.step()) {
     const auto pose = to_pose(statement.bytes(2));
-    if (!pose) return database_->damaged("key frames", statement.integer(0));
+    if (!pose || statement.integer(4) == 0) return database_->damaged("key frames", statement.integer(0));
     rows.push_back({{statement.integer(0)}, statement.real(1), *pose, statement.integer(3) != 0, {}, {}, {}});
   }
   if (const Status status = statement.status(); !status) return status.error();
   return rows;
 }
 
-Result<std::vector<StoredScan>> MapStore::scans() const {
+Result<std::vector<StoredScan>> MapStore::scans() const { return last_scans(-1); }
+
+// SQLite takes a negative limit for none.
+Result<std::vector<StoredScan>> MapStore::last_scans(int count) const {
   std::vector<StoredScan> rows;
   Statement statement = database_->prepare(
-      "SELECT frame,keyframe,stamp_s,T_keyframe_lidar,T_odom_lidar,is_tracked FROM scans ORDER BY frame");
+      "SELECT * FROM (SELECT frame,keyframe,stamp_s,T_keyframe_lidar,T_odom_lidar,is_tracked,"
+      "sum=checksum(frame,keyframe,stamp_s,T_keyframe_lidar,T_odom_lidar,is_tracked) FROM scans ORDER BY frame DESC "
+      "LIMIT ?) ORDER BY frame");
+  statement.bind(std::int64_t{count});
   while (statement.step()) {
     const auto from_keyframe = to_pose(statement.bytes(3)), from_odom = to_pose(statement.bytes(4));
-    if (!from_keyframe || !from_odom) return database_->damaged("scans", statement.integer(0));
+    if (!from_keyframe || !from_odom || statement.integer(6) == 0)
+      return database_->damaged("scans", statement.integer(0));
     rows.push_back({{statement.integer(0)},
                     {statement.integer(1)},
                     statement.real(2),
@@ -235,12 +314,12 @@ Result<std::vector<StoredScan>> MapStore::scans() const {
 Result<std::vector<StoredEdge>> MapStore::edges() const {
   std::vector<StoredEdge> rows;
   Statement statement = database_->prepare(
-      "SELECT from_frame,to_frame,T_from_to,information,score,inlier_ratio,rmse_m,probability,id FROM edges ORDER BY "
-      "id");
+      "SELECT from_frame,to_frame,T_from_to,information,score,inlier_ratio,rmse_m,probability,id,sum=checksum("
+      "from_frame,to_frame,T_from_to,information,score,inlier_ratio,rmse_m,probability) FROM edges ORDER BY id");
   while (statement.step()) {
     const auto pose = to_pose(statement.bytes(2));
     const auto information = to_matrix(statement.bytes(3));
-    if (!pose || !information) return database_->damaged("edges", statement.integer(8));
+    if (!pose || !information || statement.integer(9) == 0) return database_->damaged("edges", statement.integer(8));
     StoredEdge edge{{statement.integer(0)}, {statement.integer(1)}, *pose, *information, {}};
     if (!statement.is_null(4))
       edge.loop = LoopConstraint{edge.to,           edge.from,         edge.T_from_to,    statement.real(5),
@@ -263,21 +342,56 @@ Result<std::vector<CandidateRow>> MapStore::answers() const {
   return rows;
 }
 
+namespace {
+
+struct PartTable {
+  const char* name;
+  const char* select;
+  const char* count_damaged;
+};
+constexpr std::array<PartTable, 3> kParts = {
+    {{"descriptor", "SELECT bytes,sum=checksum(frame,bytes) FROM descriptors WHERE frame=?",
+      "SELECT frame FROM descriptors WHERE sum<>checksum(frame,bytes) LIMIT 1"},
+     {"place", "SELECT bytes,sum=checksum(frame,bytes) FROM places WHERE frame=?",
+      "SELECT frame FROM places WHERE sum<>checksum(frame,bytes) LIMIT 1"},
+     {"cloud", "SELECT bytes,sum=checksum(frame,bytes) FROM clouds WHERE frame=?",
+      "SELECT frame FROM clouds WHERE sum<>checksum(frame,bytes) LIMIT 1"}}};
+
+}  // namespace
+
 Result<Bytes> MapStore::part(FrameId keyframe, Part part) const {
-  static constexpr std::array kColumns = {"SELECT descriptor FROM keyframes WHERE frame=?",
-                                          "SELECT place FROM keyframes WHERE frame=?",
-                                          "SELECT cloud FROM keyframes WHERE frame=?"};
-  Statement statement = database_->prepare(kColumns.at(static_cast<std::size_t>(part)));
+  const PartTable& table = kParts.at(static_cast<std::size_t>(part));
+  Statement statement = database_->prepare(table.select);
   if (statement.bind(keyframe.value).step()) {
+    if (statement.integer(1) == 0) return damaged(table.name, keyframe);
     const auto bytes = statement.bytes(0);
     return Bytes(bytes.begin(), bytes.end());
   }
   if (const Status status = statement.status(); !status) return status.error();
-  return Error{database_->file + ": has no key frame " + std::to_string(keyframe.value)};
+  Statement known = database_->prepare("SELECT 1 FROM keyframes WHERE frame=?");
+  if (known.bind(keyframe.value).step()) return Bytes();
+  return Error{database_->file + ": has no key " + to_text(keyframe)};
+}
+
+Status MapStore::check() const {
+  Statement whole = database_->prepare("PRAGMA integrity_check(1)");
+  if (!whole.step()) return whole.status() ? Status(Error{database_->file + ": cannot be checked"}) : whole.status();
+  if (whole.text(0) != "ok") return Error{database_->file + ": is damaged: " + whole.text(0)};
+  const auto status_of = [](const auto& rows) { return rows ? ok() : Status(rows.error()); };
+  for (const Status& status :
+       {status_of(sessions()), status_of(keyframes()), status_of(map_poses()), status_of(scans()), status_of(edges())})
+    if (!status) return status;
+  for (const PartTable& table : kParts) {
+    Statement statement = database_->prepare(table.count_damaged);
+    if (statement.step()) return damaged(table.name, {statement.integer(0)});
+    if (const Status status = statement.status(); !status) return status;
+  }
+  return ok();
 }
 
 Error MapStore::damaged(const char* part, FrameId keyframe) const {
-  return {database_->file + ": the " + part + " of key frame " + std::to_string(keyframe.value) + " is damaged"};
+  return {database_->file + ": the " + part + " of key " + to_text(keyframe) +
+          " is damaged: restore the file from a copy"};
 }
 
 }  // namespace revisit

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -44,18 +46,37 @@ struct StoredEdge {
   std::optional<LoopConstraint> loop;         ///< where it is one: `to` is the query
 };
 
-/// A map on disk (SQLite), which grows while it is made. What was committed survives whatever happens to the program.
-/// Belongs to one thread at a time.
+/// A recording that entered the map. The store does not know what its texts mean.
+struct StoredSession {
+  int id = 0;
+  std::string recording, parameters, sensor;
+};
+
+/// Where a key frame is in the map, as the graph was settled last. Parts of the map that no loop joins have their
+/// coordinates each.
+struct StoredMapPose {
+  FrameId keyframe;
+  Pose T_map_lidar = Pose::Identity();
+  int part = 0;
+};
+
+/// A map on disk (SQLite), which grows while it is made. What was committed survives whatever happens to the program,
+/// and each row is checked against altered bytes as it is read. Belongs to one thread at a time; any number of programs
+/// may read a file while one writes it.
 class MapStore {
  public:
   /// The map in the folder of a `revisit slam`.
-  static constexpr const char* kFileName = "map.sqlite";
+  static constexpr const char* kFileName = "map.revisit";
+  /// The map that a path names: the file itself, or the one in the folder.
+  static std::filesystem::path file_of(const std::filesystem::path& path);
   /// A map that lasts as long as the program, on the disk as far as it is large.
   static Result<MapStore> create_temporary();
   /// An existing file is an error.
   static Result<MapStore> create(const std::filesystem::path& file);
-  /// Refused are files that are no map, or of another version.
-  static Result<MapStore> open(const std::filesystem::path& file);
+  enum class Access : std::uint8_t { kRead, kWrite };
+  /// Refused are files that are no map, or of a version that this program does not know. One of an earlier version is
+  /// upgraded, for which it must be writable.
+  static Result<MapStore> open(const std::filesystem::path& file, Access access = Access::kWrite);
   MapStore(MapStore&&) noexcept;
   MapStore& operator=(MapStore&&) noexcept;
   ~MapStore();
@@ -69,19 +90,33 @@ class MapStore {
   /// Nothing added since the last commit becomes part of the map.
   Status roll_back();
 
-  /// A note beside the map: which recording, which parameters. A second one of the same name replaces the first.
+  /// A second one of the same id replaces the first.
+  Status set(const StoredSession& session);
+  /// All of them: those of before are forgotten.
+  Status set_map_poses(std::span<const StoredMapPose> poses);
+
+  /// A note beside the map. A second one of the same name replaces the first.
   Status set_note(const std::string& name, const std::string& text);
   Result<std::optional<std::string>> note(const std::string& name) const;
 
+  /// In the order of their ids.
+  Result<std::vector<StoredSession>> sessions() const;
+  /// In the order of their frames; those of key frames that came after the graph was settled are missing.
+  Result<std::vector<StoredMapPose>> map_poses() const;
   /// In the order of their frames, the bytes left out.
   Result<std::vector<StoredKeyframe>> keyframes() const;
   Result<std::vector<StoredScan>> scans() const;
+  /// The last so many of them.
+  Result<std::vector<StoredScan>> last_scans(int count) const;
   /// In the order in which they were added.
   Result<std::vector<StoredEdge>> edges() const;
   Result<std::vector<CandidateRow>> answers() const;
   enum class Part { kDescriptor, kPlace, kCloud };
   /// Empty where the place was known already. An unknown frame is an error.
   Result<Bytes> part(FrameId keyframe, Part part) const;
+  /// Reads everything: an error names the first row that is not what was written.
+  Status check() const;
+  const std::string& file() const;
   /// The error for bytes that cannot be read: names the file, the part and the key frame.
   Error damaged(const char* part, FrameId keyframe) const;
 

@@ -3,23 +3,25 @@
 
 #include <cstddef>
 #include <optional>
+#include <string>
 
+#include <revisit/core/result.hpp>
 #include <revisit/preprocess/intensity.hpp>
-#include <revisit/store/map_store.hpp>
 #include <revisit/verification/typical_agreement.hpp>
 
 namespace revisit {
 
-/// What a run learnt about the sensor of a map, for runs that continue it or localise in it.
+/// What a session learnt about its sensor and its places, for runs that continue it or localise in it.
 struct SensorFacts {
   IntensityScale intensity_scale;
   TypicalAgreement typical;
-  std::size_t typical_pairs = 0;  ///< of consecutive scans that it was learnt from
+  std::size_t typical_pairs = 0;      ///< of consecutive scans that it was learnt from
+  double look_alikes_log_odds = 0.0;  ///< LookAlikes
 };
 
-/// Kept with the next commit.
-Status write_sensor_facts(MapStore& store, const SensorFacts& facts);
-/// Nothing where the map has none yet.
-Result<std::optional<SensorFacts>> read_sensor_facts(const MapStore& store);
+/// As StoredSession::sensor holds them.
+std::string to_text(const SensorFacts& facts);
+/// Nothing where the text is empty; an error where it is damaged.
+Result<std::optional<SensorFacts>> to_sensor_facts(const std::string& text);
 
 }  // namespace revisit

@@ -65,24 +65,23 @@ TEST(StoredClouds, AnUnknownPlaceAndADamagedOneAreErrors) {
 }
 
 TEST(SensorFacts, ComeBackAndDamagedOnesAreRefused) {
-  const Stored stored("facts");
-  EXPECT_FALSE(read_sensor_facts(*stored.store)->has_value()) << "none yet";
+  EXPECT_FALSE(to_sensor_facts("")->has_value()) << "none yet";
   SensorFacts facts;
   facts.intensity_scale.full_scale = 0.1;
   facts.intensity_scale.is_reflectance = false;
   facts.typical = {0.83, 0.61};
   facts.typical_pairs = 40;
-  ASSERT_TRUE(write_sensor_facts(*stored.store, facts));
-  const auto back = read_sensor_facts(*stored.store);
+  facts.look_alikes_log_odds = -1.5;
+  const auto back = to_sensor_facts(to_text(facts));
   ASSERT_TRUE(back && *back);
   EXPECT_EQ((*back)->intensity_scale.full_scale, 0.1);
   EXPECT_FALSE((*back)->intensity_scale.is_reflectance);
   EXPECT_EQ((*back)->typical.intensity_correlation, 0.61);
   EXPECT_EQ((*back)->typical_pairs, 40u);
-  for (const char* damaged : {"", "0 1 0.8 0.9 10", "1 1 1.8 0.9 10", "nan 1 0.8 0.9 10"}) {
-    ASSERT_TRUE(stored.store->set_note("sensor", damaged));
-    EXPECT_FALSE(read_sensor_facts(*stored.store)) << damaged;
-  }
+  EXPECT_EQ((*back)->look_alikes_log_odds, -1.5);
+  EXPECT_EQ((*to_sensor_facts("1 1 0.8 0.9 10"))->look_alikes_log_odds, 0.0) << "of an earlier version";
+  for (const char* damaged : {"x", "0 1 0.8 0.9 10", "1 1 1.8 0.9 10", "nan 1 0.8 0.9 10"})
+    EXPECT_FALSE(to_sensor_facts(damaged)) << damaged;
 }
 
 }  // namespace

@@ -27,6 +27,8 @@ class Statement {
 
   /// True while there is a row; false at the end or where it failed.
   bool step();
+  /// To be bound and run once more.
+  void reset();
   /// For statements that give no rows.
   Status run();
   Status status() const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <revisit/store/stored_session.hpp>
+#include <revisit/store/stored_map.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +8,7 @@
 #include <set>
 #include <string>
 
+#include <revisit/core/text.hpp>
 #include <revisit/store/keyframe_bytes.hpp>
 
 namespace revisit {
@@ -16,22 +17,23 @@ namespace {
 constexpr std::ptrdiff_t kSurroundings_keyframes = 40;  // some 60 m: what odometry can see of its map
 
 Error out_of_order(FrameId keyframe) {
-  return {"key frame " + std::to_string(keyframe.value) + " of the map does not follow the one before it"};
+  return {"key " + to_text(keyframe) + " of the map does not follow the one before it"};
 }
 
-Result<std::vector<StoredSession::Keyframe>> join(const MapStore& store, const std::vector<StoredKeyframe>& rows,
-                                                  const std::vector<StoredEdge>& edges) {
+Result<std::vector<StoredMap::Keyframe>> join(const MapStore& store, const std::vector<StoredKeyframe>& rows,
+                                              const std::vector<StoredEdge>& edges) {
   std::map<FrameId, const StoredEdge*> from_last;
   for (const StoredEdge& edge : edges)
     if (!edge.loop) from_last[edge.to] = &edge;
-  std::vector<StoredSession::Keyframe> keyframes;
+  std::vector<StoredMap::Keyframe> keyframes;
   for (const StoredKeyframe& row : rows) {
     const auto edge = from_last.find(row.frame);
     if (keyframes.empty() != (edge == from_last.end())) return out_of_order(row.frame);
     if (!keyframes.empty() && edge->second->from != keyframes.back().frame.frame) return out_of_order(row.frame);
     if (!std::isfinite(row.stamp_s) || (keyframes.empty() && row.starts_segment))
       return store.damaged("time or beginning", row.frame);
-    StoredSession::Keyframe keyframe{{row.frame, row.stamp_s}, {.T_segment_lidar = row.T_odom_lidar}, std::nullopt};
+    StoredMap::Keyframe keyframe{
+        {row.frame, row.stamp_s}, {.T_segment_lidar = row.T_odom_lidar}, std::nullopt, std::nullopt};
     if (!keyframes.empty()) {
       const TrajectoryPoint& last = keyframes.back().point;
       if (row.starts_segment)
@@ -47,41 +49,56 @@ Result<std::vector<StoredSession::Keyframe>> join(const MapStore& store, const s
 
 }  // namespace
 
-Result<StoredSession> read_session(const MapStore& store) {
+Result<StoredMap> read_map(const MapStore& store) {
+  auto sessions = store.sessions();
+  if (!sessions) return sessions.error();
   const auto rows = store.keyframes();
   if (!rows) return rows.error();
   const auto edges = store.edges();
   if (!edges) return edges.error();
-  auto scans = store.scans();
-  if (!scans) return scans.error();
+  const auto poses = store.map_poses();
+  if (!poses) return poses.error();
   auto keyframes = join(store, *rows, *edges);
   if (!keyframes) return keyframes.error();
-  auto sensor = read_sensor_facts(store);
-  if (!sensor) return sensor.error();
-  StoredSession session{*std::move(keyframes), {}, *std::move(scans), *std::move(sensor)};
+  StoredMap map{*std::move(sessions), *std::move(keyframes), {}};
+  if (!map.keyframes.empty() &&
+      (map.sessions.empty() || session_of(map.keyframes.back().frame.frame) > map.sessions.back().id))
+    return Error{"key frames of the map belong to a session that it does not know"};
+  auto next = poses->begin();
   std::set<FrameId> known;
-  for (const auto& each : session.keyframes) known.insert(each.frame.frame);
+  for (auto& each : map.keyframes) {
+    known.insert(each.frame.frame);
+    if (next != poses->end() && next->keyframe == each.frame.frame) each.settled = *next++;
+  }
+  if (next != poses->end())
+    return Error{"the map has a pose for " + to_text(next->keyframe) + ", which is no key frame"};
   for (const StoredEdge& edge : *edges) {
     if (!edge.loop) continue;
     if (edge.from == edge.to || !known.contains(edge.from) || !known.contains(edge.to))
-      return Error{"a loop of the map names key frame " + std::to_string(edge.to.value) + ", which it does not have"};
-    session.loops.push_back(*edge.loop);
+      return Error{"a loop of the map names " + to_text(edge.to) + ", which is no key frame of it"};
+    map.loops.push_back(*edge.loop);
   }
-  if (!session.keyframes.empty() && session.scans.empty()) return Error{"the map has key frames but no scans"};
-  if (!session.scans.empty() && !std::isfinite(session.scans.back().stamp_s))
-    return Error{"the last scan of the map has no time"};
-  return session;
+  return map;
 }
 
-Status restore_graph(const StoredSession& session, KeyframeGraph& graph) {
-  for (const auto& each : session.keyframes) graph.add_keyframe(each.frame.frame, each.point, each.edge);
-  for (const LoopConstraint& loop : session.loops) graph.restore_loop(loop);
-  return graph.settle();
+Status restore_graph(const StoredMap& map, KeyframeGraph& graph) {
+  bool is_settled = true;
+  for (const auto& each : map.keyframes) {
+    graph.add_keyframe(each.frame.frame, each.point, each.edge,
+                       each.settled ? std::optional(each.settled->T_map_lidar) : std::nullopt);
+    is_settled = is_settled && each.settled;
+  }
+  for (const LoopConstraint& loop : map.loops) graph.restore_loop(loop, is_settled);
+  return is_settled ? ok() : graph.settle();
 }
 
-Status restore_places(const MapStore& store, const StoredSession& session, const DescriptorOptions& grid,
+TrajectoryPoint point_in_map(const Pose& T_map_lidar, int part) {
+  return {.segment = -1 - part, .T_segment_lidar = T_map_lidar, .origin = -1 - part};
+}
+
+Status restore_places(const MapStore& store, const StoredMap& map, const DescriptorOptions& grid,
                       const RestorePlace& restore) {
-  for (const auto& each : session.keyframes) {
+  for (const auto& each : map.keyframes) {
     const auto bytes = store.part(each.frame.frame, MapStore::Part::kDescriptor);
     if (!bytes) return bytes.error();
     if (bytes->empty()) continue;
@@ -91,14 +108,17 @@ Status restore_places(const MapStore& store, const StoredSession& session, const
       return Error{"the map describes places on a grid of " + std::to_string(descriptor->rings) + " x " +
                    std::to_string(descriptor->sectors) + " x " + std::to_string(descriptor->levels) +
                    " cells, the parameters on another one: use those that the map was made with"};
-    restore(each.frame, *descriptor, each.point);
+    restore(each, *descriptor);
   }
   return ok();
 }
 
-Status restore_odometry(const MapStore& store, const StoredSession& session, Odometry& odometry,
-                        KeyframeSelection& selection) {
-  const auto& keyframes = session.keyframes;
+Status restore_odometry(const MapStore& store, const StoredMap& map, Odometry& odometry, KeyframeSelection& selection) {
+  const auto scans = store.last_scans(2);
+  if (!scans) return scans.error();
+  if (scans->empty() || !std::isfinite(scans->back().stamp_s))
+    return Error{"the map has key frames, but its last scan has no time or is not there"};
+  const auto& keyframes = map.keyframes;
   auto first = keyframes.end() - std::min(kSurroundings_keyframes, std::ssize(keyframes));
   // Nothing from before a loss of track: how that lies to what came after is not known.
   const int segment = keyframes.back().point.segment;
@@ -109,10 +129,10 @@ Status restore_odometry(const MapStore& store, const StoredSession& session, Odo
     if (!points->empty()) odometry.restore_map(it->frame.stamp_s, *points, it->point.T_segment_lidar);
     if (it + 1 == keyframes.end()) selection.set_last(it->point.T_segment_lidar, SeenSpace(*points));
   }
-  const StoredScan& last = session.scans.back();
+  const StoredScan& last = scans->back();
   std::optional<Twist> motion;
-  if (session.scans.size() >= 2) {
-    const StoredScan& before = session.scans[session.scans.size() - 2];
+  if (scans->size() == 2 && session_of(scans->front().frame) == session_of(last.frame)) {
+    const StoredScan& before = scans->front();
     if (const double gap_s = last.stamp_s - before.stamp_s; gap_s > 0.0 && std::isfinite(gap_s))
       motion = twist_of(before.T_odom_lidar.inverse() * last.T_odom_lidar, gap_s);
   }
