@@ -12,7 +12,7 @@ int main(int, char** argv) {
   if (!scan) return std::puts(scan.error().message.c_str()), 1;
   const auto found = localiser->locate(*std::move(scan));
   if (!found) return std::puts(found.error().message.c_str()), 1;
-  if (!found->T_map_lidar) return std::printf("not found: %s\n", found->detection.reason().c_str()), 0;
+  if (!found->T_map_lidar) return std::printf("not found: %s\n", found->reason.c_str()), 0;
   const Eigen::Vector3d t = found->T_map_lidar->translation();
   std::printf("at (%.2f, %.2f, %.2f) m in the map; probability %.3f\n", t.x(), t.y(), t.z(), found->probability);
 }

@@ -32,6 +32,7 @@ enum ExitCode : int {
 using Run = std::function<int()>;
 Run add_detect(CLI::App& program);
 Run add_slam(CLI::App& program);
+Run add_localise(CLI::App& program);
 Run add_evaluate(CLI::App& program);
 Run add_compare(CLI::App& program);
 Run add_describe(CLI::App& program);

@@ -13,6 +13,7 @@ int main(int argc, char** argv) {
       "  revisit info RECORDING                     what is in there\n"
       "  revisit detect RECORDING --out results     find the loops\n"
       "  revisit slam RECORDING --out map           trajectory and map\n"
+      "  revisit localise map SCAN                  where in the map is this scan?\n"
       "  revisit evaluate results --reference POSES score them, draw them\n\n"
       "RECORDING is a ROS bag (.bag, .mcap, .db3, or a folder of them), a packet capture (.pcap), a KITTI odometry "
       "folder "
@@ -30,7 +31,7 @@ int main(int argc, char** argv) {
 
   program_arguments().assign(argv + 1, argv + argc);
   std::vector<std::pair<CLI::App*, Run>> commands;
-  for (const auto add : {add_info, add_describe, add_detect, add_slam, add_evaluate, add_compare, add_calibrate,
+  for (const auto add : {add_info, add_describe, add_detect, add_slam, add_localise, add_evaluate, add_compare, add_calibrate,
                          add_simulate, add_convert, add_parameters}) {
     Run run = add(program);
     commands.emplace_back(program.get_subcommands({}).back(), std::move(run));

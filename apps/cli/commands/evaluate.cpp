@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <iostream>
+#include <map>
 #include <memory>
 #include <optional>
 
@@ -20,6 +21,7 @@ namespace fs = std::filesystem;
 
 struct EvaluateOptions {
   std::string results, reference, recording, calibration;
+  std::vector<std::string> map_references;
   std::optional<int> exclude_frames;
   std::optional<double> exclude_s;
 };
@@ -122,14 +124,60 @@ Status judge_trajectories(const fs::path& folder, const Trajectory& reference, E
   return draw_trajectories(folder / "trajectories.png", reference, *before, *after, folder / "tiles");
 }
 
+// True poses of the map's key frames: a reference for each session, in the order in which they entered the map.
+Result<std::map<FrameId, Pose>> true_keyframes(const EvaluateOptions& options, const std::string& map) {
+  const auto store = MapStore::open(MapStore::file_of(map), MapStore::Access::kRead);
+  if (!store) return store.error();
+  const auto keyframes = store->keyframes();
+  const auto sessions = store->sessions();
+  if (!keyframes) return keyframes.error();
+  if (!sessions) return sessions.error();
+  std::vector<Trajectory> references;
+  for (std::size_t i = 0; i < sessions->size(); ++i) {
+    EvaluateOptions of_session = options;
+    of_session.reference = i < options.map_references.size() ? options.map_references[i] : (*sessions)[i].recording;
+    const auto recording = open_input((*sessions)[i].recording);
+    auto reference = load_reference(of_session, recording ? recording->get() : nullptr);
+    if (!reference) return reference.error();
+    references.push_back(*std::move(reference));
+  }
+  std::map<FrameId, Pose> poses;
+  for (const StoredKeyframe& each : *keyframes)
+    if (const auto pose = references.at(static_cast<std::size_t>(session_of(each.frame))).at(in_recording(each.frame)))
+      poses[each.frame] = *pose;
+  if (poses.empty()) return Error{map + ": no key frame has a reference pose; name a reference with --map-reference"};
+  return poses;
+}
+
+// What `revisit localise` wrote: table 5.
+int evaluate_localisation(const EvaluateOptions& options) {
+  const fs::path folder = options.results;
+  const auto rows = read_localisation(folder / "localisation.csv");
+  if (!rows) return fail(rows.error());
+  const auto facts = read_run(folder / "run.json");
+  if (!facts) return fail(facts.error());
+  const auto recording =
+      open_input(options.recording.empty() ? facts->input : options.recording, {.topic = facts->topic});
+  const auto queries = load_reference(options, recording ? recording->get() : nullptr);
+  if (!queries) return fail(queries.error());
+  const auto keyframes = true_keyframes(options, facts->database);
+  if (!keyframes) return fail(keyframes.error());
+  const WakingTable table = evaluate_waking(*rows, *queries, *keyframes, {});
+  std::cout << to_text(table, keyframes->size());
+  if (const Status status = write_text(folder / "evaluation.json", to_json(table, keyframes->size())); !status)
+    return fail(status.error());
+  return kDone;
+}
+
 int evaluate(const EvaluateOptions& options) {
   const fs::path folder = options.results;
+  std::error_code failure;
+  if (fs::exists(folder / "localisation.csv", failure)) return evaluate_localisation(options);
   const auto candidates = read_candidates(folder / "candidates.csv");
   if (!candidates) return fail(candidates.error());
   const auto loops = read_loops(folder / "loops.csv");
   if (!loops) return fail(loops.error());
   RunFacts facts;
-  std::error_code failure;
   if (fs::exists(folder / "run.json", failure)) {
     const auto run = read_run(folder / "run.json");
     if (!run) return fail(run.error());
@@ -194,7 +242,8 @@ Run add_evaluate(CLI::App& program) {
   auto options = std::make_shared<EvaluateOptions>();
   CLI::App* command = program.add_subcommand("evaluate", "Score results against reference poses, and draw them.");
   command->footer(
-      "Prints table 1 (retrieval), table 2 (loop constraints) and, of `revisit slam`, table 3 (trajectory), and "
+      "Prints table 1 (retrieval), table 2 (loop constraints) and, of `revisit slam`, table 3 (trajectory), or, of "
+      "`revisit localise`,\ntable 5 (waking up in a map), and "
       "writes\n"
       "into DIR: report.html, precision_recall.png, trajectory.png, trajectories.png, evaluation.json. Works on the "
       "files of any program that writes\n"
@@ -207,6 +256,9 @@ Run add_evaluate(CLI::App& program) {
                    "Reference poses: a KITTI, TUM or g2o file, or a recording that has poses")
       ->required();
   command->add_option("--recording", options->recording, "The recording, where it is not where run.json says");
+  command->add_option("--map-reference", options->map_references,
+                      "Reference poses of the map that `revisit localise` used, one for each of its sessions, in the "
+                      "same world (default: those of the recordings that it was made of)");
   command->add_option("--camera-calibration", options->calibration,
                       "calib.txt with the row Tr, for poses of a KITTI camera (default: beside the poses)");
   command->add_option("--exclude-frames", options->exclude_frames,

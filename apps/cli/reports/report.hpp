@@ -7,6 +7,7 @@
 #include <revisit/evaluation/loop_table.hpp>
 #include <revisit/evaluation/retrieval_table.hpp>
 #include <revisit/evaluation/trajectory_table.hpp>
+#include <revisit/evaluation/waking_table.hpp>
 
 namespace revisit::cli {
 
@@ -24,6 +25,9 @@ struct EvaluationReport {
 
 std::string to_text(const EvaluationReport& report);
 std::string to_json(const EvaluationReport& report);
+/// Table 5; `keyframes` are those of the map.
+std::string to_text(const WakingTable& table, std::size_t keyframes);
+std::string to_json(const WakingTable& table, std::size_t keyframes);
 /// A page that shows the tables and the pictures beside it.
 std::string to_html(const EvaluationReport& report);
 

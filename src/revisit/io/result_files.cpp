@@ -16,6 +16,9 @@ namespace fs = std::filesystem;
 using io_internal::TextWriter;
 
 constexpr const char* kCandidateHeader = "query,match,score,accepted,reason";
+constexpr const char* kLocalisationHeader =
+    "frame,status,session,match,tx,ty,tz,qx,qy,qz,qw,match_tx,match_ty,match_tz,match_qx,match_qy,match_qz,match_qw,"
+    "probability,deviation_m,deviation_deg,ms,reason";
 constexpr const char* kLoopHeader = "query,match,score,tx,ty,tz,qx,qy,qz,qw,inlier_ratio,rmse_m";
 
 std::vector<std::string_view> split_cells(std::string_view line) {
@@ -117,6 +120,39 @@ Status ResultWriter::finish() {
   return candidates ? loops : candidates;
 }
 
+struct LocalisationWriter::File {
+  TextWriter text;
+};
+
+LocalisationWriter::LocalisationWriter(const fs::path& file) : file_(std::make_unique<File>(File{TextWriter(file)})) {
+  file_->text.stream() << kLocalisationHeader << '\n' << std::setprecision(10);
+}
+LocalisationWriter::LocalisationWriter(LocalisationWriter&&) noexcept = default;
+LocalisationWriter::~LocalisationWriter() = default;
+
+Status LocalisationWriter::add(const LocalisationRow& row) {
+  auto& out = file_->text.stream();
+  out << row.frame.value << ',' << row.status << ',';
+  if (row.is_answered()) out << session_of(row.match) << ',' << in_recording(row.match).value;
+  else out << ',';
+  for (const Pose* T : {&row.T_map_lidar, &row.T_match_lidar}) {
+    const Eigen::Vector3d t = T->translation();
+    const Eigen::Quaterniond q = Eigen::Quaterniond(T->rotation()).normalized();
+    for (const double value : {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()}) {
+      out << ',';
+      if (row.is_answered()) out << value;
+    }
+  }
+  std::string reason = row.reason;
+  std::replace_if(
+      reason.begin(), reason.end(), [](char c) { return c == ',' || c == '\n' || c == '"'; }, ';');
+  out << ',' << row.probability << ',' << row.deviation_m << ',' << row.deviation_deg << ',' << row.ms << ',' << reason
+      << '\n';
+  return file_->text.flush();
+}
+
+Status LocalisationWriter::finish() { return file_->text.finish(); }
+
 Result<std::vector<CandidateRow>> read_candidates(const fs::path& file) {
   std::vector<CandidateRow> rows;
   const Status status = read_csv(file, kCandidateHeader, [&](const std::vector<std::string_view>& cells) {
@@ -162,6 +198,43 @@ Result<std::vector<LoopConstraint>> read_loops(const fs::path& file) {
     loop.inlier_ratio = v[8];
     loop.rmse_m = v[9];
     rows.push_back(loop);
+    return true;
+  });
+  if (!status) return status.error();
+  return rows;
+}
+
+Result<std::vector<LocalisationRow>> read_localisation(const fs::path& file) {
+  std::vector<LocalisationRow> rows;
+  const Status status = read_csv(file, kLocalisationHeader, [&](const std::vector<std::string_view>& cells) {
+    if (cells.size() != 23) return false;
+    LocalisationRow row;
+    const auto query = frame(cells[0]);
+    const auto ms = number(cells[21]), probability = number(cells[18]);
+    if (!query || !ms || !probability) return false;
+    row.frame = *query;
+    row.status = cells[1];
+    row.probability = *probability;
+    row.ms = *ms;
+    row.reason = cells[22];
+    if (row.is_answered()) {
+      const auto session = frame(cells[2]), match = frame(cells[3]);
+      if (!session || !match || session->value < 0 || session->value > INT16_MAX || !fits_into_map(*match)) return false;
+      row.match = in_map(static_cast<int>(session->value), *match);
+      for (const auto& [T, first] : {std::pair{&row.T_map_lidar, std::size_t{4}}, {&row.T_match_lidar, 11}}) {
+        std::array<double, 7> v{};
+        for (std::size_t i = 0; i < v.size(); ++i) {
+          const auto value = number(cells[first + i]);
+          if (!value || !std::isfinite(*value)) return false;
+          v[i] = *value;
+        }
+        const Eigen::Quaterniond q(v[6], v[3], v[4], v[5]);
+        if (std::abs(q.norm() - 1.0) > 1e-2) return false;
+        T->linear() = q.normalized().toRotationMatrix();
+        T->translation() << v[0], v[1], v[2];
+      }
+    }
+    rows.push_back(row);
     return true;
   });
   if (!status) return status.error();

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <revisit/core/candidate_row.hpp>
+#include <revisit/core/localisation_row.hpp>
 #include <revisit/core/loop.hpp>
 #include <revisit/core/result.hpp>
 
@@ -32,9 +33,26 @@ class ResultWriter {
   std::unique_ptr<Files> files_;
 };
 
+/// Writes localisation.csv row by row, as ResultWriter does. Not for several threads.
+class LocalisationWriter {
+ public:
+  /// Replaces what is there.
+  explicit LocalisationWriter(const std::filesystem::path& file);
+  LocalisationWriter(LocalisationWriter&&) noexcept;
+  ~LocalisationWriter();
+
+  Status add(const LocalisationRow& row);
+  Status finish();
+
+ private:
+  struct File;
+  std::unique_ptr<File> file_;
+};
+
 /// Read what ResultWriter, or any other program that follows the format, wrote (docs/formats.md).
 Result<std::vector<CandidateRow>> read_candidates(const std::filesystem::path& file);
 Result<std::vector<LoopConstraint>> read_loops(const std::filesystem::path& file);
+Result<std::vector<LocalisationRow>> read_localisation(const std::filesystem::path& file);
 
 /// Writes `text` (a report, JSON) whole; a failure names the file and the reason.
 Status write_text(const std::filesystem::path& file, const std::string& text);

@@ -1,30 +1,79 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/pipeline/localiser.hpp>
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
+#include <revisit/core/text.hpp>
+#include <revisit/preprocess/range_filter.hpp>
 #include <revisit/store/sensor_facts.hpp>
 #include <revisit/store/stored_clouds.hpp>
 
 namespace revisit {
+namespace {
 
-Localiser::Localiser(SavedMap map, const Parameters& parameters, LogSink log)
-    : map_(std::move(map)),
-      preparation_(parameters, std::nullopt, {}, std::move(log)),
+struct Staying {
+  // Of a scan that was registered where it was predicted: it is there unless its own evidence speaks against it.
+  static constexpr double kLeast_log_odds = -3.0;
+  static constexpr double kMost_m = 0.6, kMost_mAMetre = 0.03, kMost_deg = 4.0;  ///< from the prediction
+  static constexpr double kFar_m = 20.0;   ///< from the nearest place: it has left the map
+  static constexpr double kLost_m = 15.0;  ///< travelled without seeing the map
+  static constexpr double kLost_s = 6.0;
+  static constexpr double kDrift = 0.01;  ///< of odometry, a standard deviation for each metre
+};
+
+// What a pose is known to be after so much odometry.
+Matrix6 after_motion(const Matrix6& information, double metres) {
+  if (information.isZero() || metres <= 0.0) return information;
+  const double variance_m2 = std::pow(Staying::kDrift * metres, 2), variance_rad2 = 0.01 * variance_m2;
+  Vector6 diagonal;
+  diagonal << Eigen::Vector3d::Constant(variance_m2), Eigen::Vector3d::Constant(variance_rad2);
+  const Matrix6 prior = Vector6::Constant(1e-6).asDiagonal();
+  const Matrix6 covariance = Matrix6((information + prior).inverse()) + Matrix6(diagonal.asDiagonal());
+  const Matrix6 after = covariance.inverse();
+  return 0.5 * (after + after.transpose());
+}
+
+}  // namespace
+
+const char* to_string(Localisation::Status status) {
+  switch (status) {
+    case Localisation::Status::kLost:
+      return "lost";
+    case Localisation::Status::kFound:
+      return "found";
+    case Localisation::Status::kFollowed:
+      return "followed";
+    case Localisation::Status::kPredicted:
+      return "predicted";
+  }
+  return "";
+}
+
+Localiser::Localiser(SavedMap map, const Parameters& parameters, LogSink log,
+                     const std::optional<IntensityScale>& scale)
+    : parameters_(parameters),
+      map_(std::move(map)),
+      odometry_(Odometry::Source::kLidar, ScanMatcher::kCoarse),
+      preparation_(parameters, scale, {}, std::move(log)),
       recognition_(parameters, clouds_in_store(map_.store())) {}
 
-Result<Localiser> Localiser::open(const std::filesystem::path& path, const Parameters& parameters, LogSink log) {
+Result<Localiser> Localiser::open(const std::filesystem::path& path, const Parameters& parameters, LogSink log,
+                                  const std::optional<IntensityScale>& scale) {
   if (const Status status = validate(parameters); !status) return status.error();
   auto map = SavedMap::open(path);
   if (!map) return map.error();
-  Localiser localiser(*std::move(map), parameters, std::move(log));
+  Localiser localiser(*std::move(map), parameters, std::move(log), scale);
   const SavedMap& opened = localiser.map_;
   const auto add_place = [&](const StoredMap::Keyframe& place, const IntensityScanContext& descriptor) {
     const FrameId frame = place.frame.frame;
-    localiser.recognition_.restore(place.frame, descriptor,
-                                   point_in_map(opened.T_map_lidar(frame), opened.part(frame)));
+    const Pose& T_map_lidar = opened.T_map_lidar(frame);
+    localiser.recognition_.restore(place.frame, descriptor, point_in_map(T_map_lidar, opened.part(frame)));
+    localiser.places_.push_back({frame, T_map_lidar.translation(), opened.part(frame)});
   };
-  if (const Status status = restore_places(*opened.store(), opened.stored(), parameters.descriptor, add_place); !status)
+  if (const Status status = restore_places(*opened.store(), opened.stored(), parameters.descriptor, add_place);
+      !status)
     return Error{path.string() + ": " + status.error().message};
   // What the last session knows: of several sensors, the one that was used last.
   for (const StoredSession& session : opened.stored().sessions) {
@@ -37,18 +86,148 @@ Result<Localiser> Localiser::open(const std::filesystem::path& path, const Param
   return localiser;
 }
 
+Localisation Localiser::found(FrameId frame, const LoopConstraint& loop) const {
+  Localisation result;
+  result.frame = frame;
+  result.status = Localisation::Status::kFound;
+  result.T_map_lidar = map_.T_map_lidar(loop.match) * loop.T_match_query;
+  result.probability = loop.probability;
+  result.information = loop.information;
+  result.match = loop.match;
+  return result;
+}
+
 Result<Localisation> Localiser::locate(Scan scan) {
   const auto prepared = preparation_.prepare(std::move(scan));
   if (!prepared) return prepared.error();
   auto detection = recognition_.find(*prepared, places(), typical_);
   if (!detection) return detection.error();
   Localisation result;
-  if (const auto& loop = detection->loop) {
-    result.T_map_lidar = map_.T_map_lidar(loop->match) * loop->T_match_query;
-    result.probability = loop->probability;
-    result.information = loop->information;
-  }
+  if (detection->loop) result = found(prepared->scan.frame, *detection->loop);
+  result.frame = prepared->scan.frame;
+  result.reason = detection->reason();
   result.detection = *std::move(detection);
+  return result;
+}
+
+Result<Localisation> Localiser::follow(Scan scan, const std::optional<Pose>& T_external_lidar) {
+  filter_range(scan, parameters_.preprocess);
+  const FrameId frame = scan.frame;
+  const OdometryStep step = odometry_.follow(scan, T_external_lidar);
+  scan.stamp_s = step.stamp_s;
+  if (step.up) scan.up = step.up;
+  if (point_ && point_->segment == step.segment)
+    point_ = point_->to(step.T_odom_lidar);
+  else
+    point_ = TrajectoryPoint{.segment = step.segment, .T_segment_lidar = step.T_odom_lidar, .origin = step.segment};
+  if (following_ && following_->at.segment != point_->segment) following_.reset();  // odometry has lost itself
+  auto prepared = preparation_.prepare(std::move(scan), step.motion);
+  if (!prepared) return prepared.error();
+  if (following_) {
+    auto stayed = stay(*prepared, *point_);
+    if (!stayed || stayed->status != Localisation::Status::kLost) return stayed;
+  }
+  auto result = wake_up(*prepared, *point_);
+  if (result) result->frame = frame;
+  return result;
+}
+
+Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const TrajectoryPoint& point) {
+  auto detection = recognition_.find(scan, places(), typical_);
+  if (!detection) return detection.error();
+  std::vector<PoseBelief::Sighting> sightings;
+  for (const Detection::Registered& each : detection->registered)
+    sightings.push_back({each.match, map_.part(each.match),
+                         map_.T_map_lidar(each.match) * each.evidence.T_match_query, each.evidence.own_log_odds});
+  belief_.add(point, sightings);
+  Localisation result;
+  result.reason = detection->reason();
+  const auto best = belief_.best();
+  const double probability = best ? probability_of(best->log_odds) : 0.0;
+  if (detection->loop) {
+    result = found(scan.scan.frame, *detection->loop);
+  } else if (best && probability >= parameters_.geometric.min_probability) {
+    result.status = Localisation::Status::kFound;
+    result.T_map_lidar = best->T_map_segment * point.T_segment_lidar;
+    result.probability = probability;
+    result.match = best->match;
+    for (const Detection::Registered& each : detection->registered)
+      if (each.match == best->match) result.information = each.evidence.information;
+  }
+  if (result.T_map_lidar) {
+    following_ = Following{*result.T_map_lidar * point.T_segment_lidar.inverse(),
+                           point,
+                           scan.scan.stamp_s,
+                           map_.part(result.match),
+                           result.match,
+                           result.information,
+                           result.probability};
+    belief_.clear();
+  }
+  result.frame = scan.scan.frame;
+  result.detection = *std::move(detection);
+  return result;
+}
+
+std::optional<PosePrediction> Localiser::nearest_place(const Pose& T_map_lidar) const {
+  const Place* nearest = nullptr;
+  double squared_m2 = std::pow(Staying::kFar_m, 2);
+  for (const Place& each : places_) {
+    const double distance_m2 = (each.position_m - T_map_lidar.translation()).squaredNorm();
+    if (each.part != following_->part || distance_m2 >= squared_m2) continue;
+    squared_m2 = distance_m2;
+    nearest = &each;
+  }
+  if (nearest == nullptr) return std::nullopt;
+  return PosePrediction{nearest->frame, map_.T_map_lidar(nearest->frame).inverse() * T_map_lidar, 0.0};
+}
+
+Result<Localisation> Localiser::stay(const PreparedScan& scan, const TrajectoryPoint& point) {
+  Following& state = *following_;
+  const double travelled_m = point.travelled_m - state.at.travelled_m;
+  Localisation result;
+  result.frame = scan.scan.frame;
+  const Pose T_predicted = state.T_map_segment * point.T_segment_lidar;
+  const auto prediction = nearest_place(T_predicted);
+  if (prediction) {
+    const auto tested = recognition_.test(scan, *prediction, typical_);
+    if (!tested) return tested.error();
+    if (tested->geometric) {
+      const GeometricEvidence& evidence = *tested->geometric;
+      const Pose off = prediction->T_match_query.inverse() * evidence.T_match_query;
+      if (evidence.own_log_odds >= Staying::kLeast_log_odds &&
+          off.translation().norm() <= Staying::kMost_m + Staying::kMost_mAMetre * travelled_m &&
+          rotation_angle(off) <= to_radians(Staying::kMost_deg)) {
+        result.status = Localisation::Status::kFollowed;
+        result.T_map_lidar = map_.T_map_lidar(prediction->match) * evidence.T_match_query;
+        result.information = evidence.information;
+        result.probability = std::max(evidence.probability, state.probability);
+        result.match = prediction->match;
+        state = {*result.T_map_lidar * point.T_segment_lidar.inverse(),
+                 point,
+                 scan.scan.stamp_s,
+                 state.part,
+                 result.match,
+                 result.information,
+                 result.probability};
+        return result;
+      }
+      result.reason = format("does not fit the map where it is predicted: inliers %.2f, %.2f m off",
+                             evidence.evidence.inlier_ratio, off.translation().norm());
+    }
+  }
+  if (result.reason.empty())
+    result.reason = prediction ? "does not fit the map where it is predicted"
+                               : format("no place of the map is within %.0f m", Staying::kFar_m);
+  if (travelled_m > Staying::kLost_m || scan.scan.stamp_s - state.stamp_s > Staying::kLost_s) {
+    following_.reset();
+    return result;
+  }
+  result.status = Localisation::Status::kPredicted;
+  result.T_map_lidar = T_predicted;
+  result.information = after_motion(state.information, travelled_m);
+  result.probability = state.probability;
+  result.match = state.match;
   return result;
 }
 

@@ -4,8 +4,12 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
+#include <revisit/localisation/pose_belief.hpp>
 #include <revisit/localisation/saved_map.hpp>
+#include <revisit/odometry/odometry.hpp>
 #include <revisit/pipeline/detection.hpp>
 #include <revisit/pipeline/place_recognition.hpp>
 
@@ -13,32 +17,75 @@ namespace revisit {
 
 /// Where a scan is in a saved map.
 struct Localisation {
-  std::optional<Pose> T_map_lidar;        ///< absent where the scan was not found; `detection` says why
-  double probability = 0.0;               ///< that the pose is right (docs/accuracy.md)
-  Matrix6 information = Matrix6::Zero();  ///< of the pose relative to the key frame, as in LoopConstraint
-  Detection detection;                    ///< match: the frame of the key frame in the map's own recording
+  enum class Status : std::uint8_t {
+    kLost,       ///< not found, or not surely enough; `reason` says why
+    kFound,      ///< found without a prior, by this scan alone or with those before it
+    kFollowed,   ///< found where odometry predicted it
+    kPredicted,  ///< where odometry predicts it: the scan does not fit the map there (something moved, or is new)
+  };
+  FrameId frame;
+  Status status = Status::kLost;
+  std::optional<Pose> T_map_lidar;  ///< absent where it is lost
+  double probability = 0.0;         ///< that the pose is right (docs/accuracy.md)
+  /// Of the pose relative to the key frame, as in LoopConstraint; of a predicted one, less for each metre.
+  Matrix6 information = Matrix6::Zero();
+  FrameId match;       ///< the key frame of the map (in_map()) that it was registered with last
+  std::string reason;  ///< why it is lost or predicted only
+  Detection detection;  ///< what locate() found out; of follow() only while it is lost
 };
+/// "lost", "found", "followed", "predicted".
+const char* to_string(Localisation::Status status);
 
-/// A saved map answers: where am I? One scan, without a prior. Takes scans as a driver delivers them. Belongs to one
-/// thread at a time.
+/// A saved map answers: where am I? Takes scans as a driver delivers them. Belongs to one thread at a time.
 class Localiser {
  public:
   /// `map`: what `revisit slam --out` or Slam::open() wrote. Its scans are not read again. The parameters must be those
   /// of its descriptors.
-  static Result<Localiser> open(const std::filesystem::path& map, const Parameters& parameters = {}, LogSink log = {});
+  static Result<Localiser> open(const std::filesystem::path& map, const Parameters& parameters = {}, LogSink log = {},
+                                const std::optional<IntensityScale>& scale = std::nullopt);
 
-  /// An error where the scan describes no place, or a place of the map cannot be read.
+  /// One scan, without a prior, whatever came before. An error where the scan describes no place, or a place of the map
+  /// cannot be read.
   Result<Localisation> locate(Scan scan);
+  /// The next scan of a drive: found without a prior, by as many scans as it takes, then followed with odometry, and
+  /// found again where it gets lost. Frames and stamps increase. `T_external_lidar`: as in Slam::process().
+  Result<Localisation> follow(Scan scan, const std::optional<Pose>& T_external_lidar = std::nullopt);
 
   std::size_t places() const { return recognition_.index().size(); }
+  const SavedMap& map() const { return map_; }
 
  private:
-  Localiser(SavedMap map, const Parameters& parameters, LogSink log);
+  Localiser(SavedMap map, const Parameters& parameters, LogSink log, const std::optional<IntensityScale>& scale);
+  Result<Localisation> wake_up(const PreparedScan& scan, const TrajectoryPoint& point);
+  Result<Localisation> stay(const PreparedScan& scan, const TrajectoryPoint& point);
+  std::optional<PosePrediction> nearest_place(const Pose& T_map_lidar) const;
+  Localisation found(FrameId frame, const LoopConstraint& loop) const;
 
+  struct Place {
+    FrameId frame;
+    Eigen::Vector3d position_m;  ///< in the map
+    int part = 0;
+  };
+  struct Following {
+    Pose T_map_segment = Pose::Identity();  ///< of the odometry's segment
+    TrajectoryPoint at;                     ///< where the map was seen last
+    double stamp_s = 0.0;
+    int part = 0;
+    FrameId match;
+    Matrix6 information = Matrix6::Zero();
+    double probability = 0.0;
+  };
+
+  Parameters parameters_;
   SavedMap map_;
+  Odometry odometry_;
   ScanPreparation preparation_;
   PlaceRecognition recognition_;
   TypicalAgreement typical_;
+  std::vector<Place> places_;
+  PoseBelief belief_;
+  std::optional<TrajectoryPoint> point_;
+  std::optional<Following> following_;
 };
 
 }  // namespace revisit

@@ -41,25 +41,40 @@ Result<Detection> PlaceRecognition::find(const PreparedScan& query, std::size_t 
   return detection;
 }
 
+VerificationContext PlaceRecognition::context(const TypicalAgreement& typical) const {
+  return {.parameters = parameters_,
+          .clouds = *clouds_,
+          .query_descriptor = [this](FrameId frame) -> std::optional<DescriptorView> {
+            const auto found = std::find_if(recent_queries_.begin(), recent_queries_.end(),
+                                            [&](const RecentQuery& each) { return each.frame == frame; });
+            if (found == recent_queries_.end()) return std::nullopt;
+            return found->descriptor;
+          },
+          .place_descriptor = [this](FrameId frame) { return index_.find(frame); },
+          .places = points_,
+          .following = following_,
+          .typical = typical,
+          .look_alikes_log_odds = look_alikes_log_odds(),
+          .newest = {}};
+}
+
+Result<Hypothesis> PlaceRecognition::test(const PreparedScan& query, const PosePrediction& prediction,
+                                          const TypicalAgreement& typical) {
+  const VerificationQuery question{query.scan.frame, query.descriptor, query.cloud, query.geometry, std::nullopt};
+  const VerificationContext context = this->context(typical);
+  CandidateRegistration registration(context, question);
+  auto hypothesis = registration.test(prediction);
+  if (hypothesis && hypothesis->geometric)
+    refine(*hypothesis->geometric, *hypothesis->geometry, registration.query_geometry());
+  return hypothesis;
+}
+
 Status PlaceRecognition::verify(const PreparedScan& query, const TypicalAgreement& typical, Detection& detection) {
   Stopwatch watch;
   const VerificationQuery question{query.scan.frame, query.descriptor, query.cloud, query.geometry,
                                    query.trajectory_point};
-  const VerificationContext context{
-      .parameters = parameters_,
-      .clouds = *clouds_,
-      .query_descriptor = [this](FrameId frame) -> std::optional<DescriptorView> {
-        const auto found = std::find_if(recent_queries_.begin(), recent_queries_.end(),
-                                        [&](const RecentQuery& each) { return each.frame == frame; });
-        if (found == recent_queries_.end()) return std::nullopt;
-        return found->descriptor;
-      },
-      .place_descriptor = [this](FrameId frame) { return index_.find(frame); },
-      .places = points_,
-      .following = following_,
-      .typical = typical,
-      .look_alikes_log_odds = look_alikes_log_odds(),
-      .newest = detection.candidates.empty() ? FrameId{} : index_.frame(detection.searchable_places - 1)};
+  VerificationContext context = this->context(typical);
+  context.newest = detection.candidates.empty() ? FrameId{} : index_.frame(detection.searchable_places - 1);
   LoopVerification verification(context, question);
   if (queries_++ % kLearnsEvery == 0 && parameters_.geometric.overhead_search)
     if (const Status status = learn_look_alikes(query, verification.registration()); !status) return status;

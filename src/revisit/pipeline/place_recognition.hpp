@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <deque>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include <revisit/pipeline/detection.hpp>
@@ -25,6 +27,12 @@ class PlaceRecognition {
 
   /// Looks for the scan among the first `places` of the index. An error where a place cannot be read.
   Result<Detection> find(const PreparedScan& query, std::size_t places, const TypicalAgreement& typical);
+  /// The scan registered near to where it is predicted to stand, and nowhere else.
+  Result<Hypothesis> test(const PreparedScan& query, const PosePrediction& prediction, const TypicalAgreement& typical);
+  /// How much alike the places of a finished map are: some of them are looked for among those that are elsewhere.
+  /// `point_of` gives their poses in the map (point_in_map()). For set_look_alikes().
+  Result<double> learn_look_alikes_of_map(const std::function<TrajectoryPoint(FrameId)>& point_of,
+                                          const TypicalAgreement& typical);
   /// Adds a place.
   Status add(PreparedScan place);
   /// A place whose cloud is kept already, of an earlier run.
@@ -32,11 +40,12 @@ class PlaceRecognition {
                const std::optional<TrajectoryPoint>& point);
 
   const PlaceIndex& index() const { return index_; }
-  /// How much alike the places are (LookAlikes); of an earlier run where this one knows nothing yet.
-  double look_alikes_log_odds() const { return std::min(look_alikes_.log_odds(), look_alikes_before_); }
-  void set_look_alikes(double log_odds) { look_alikes_before_ = log_odds; }
+  /// How much alike the places are (LookAlikes): as this run learnt, or as the map says.
+  double look_alikes_log_odds() const { return look_alikes_of_map_ ? *look_alikes_of_map_ : look_alikes_.log_odds(); }
+  void set_look_alikes(double log_odds) { look_alikes_of_map_ = log_odds; }
 
  private:
+  VerificationContext context(const TypicalAgreement& typical) const;
   Status verify(const PreparedScan& query, const TypicalAgreement& typical, Detection& detection);
   Status learn_look_alikes(const PreparedScan& query, CandidateRegistration& registration);
   void accept(const PreparedScan& query, Hypothesis& answer, const ScanGeometry& query_geometry, Detection& detection);
@@ -47,7 +56,7 @@ class PlaceRecognition {
   TrajectoryPoints points_;  ///< of all places
   LoopFollowing following_;
   LookAlikes look_alikes_;
-  double look_alikes_before_ = 0.0;
+  std::optional<double> look_alikes_of_map_;
   std::size_t queries_ = 0;
   struct RecentQuery {
     FrameId frame;

@@ -82,12 +82,11 @@ Result<SlamBackEnd::Added> SlamBackEnd::add_keyframe(PreparedScan scan, const Od
     keyframe.place = to_bytes(scan.cloud);
     keyframe.cloud = std::move(map_cloud);
   }
-  SensorFacts known = sensor;
-  known.look_alikes_log_odds = recognition_.look_alikes_log_odds();
+  facts_ = sensor;
   Status stored = store_->add(keyframe);
   if (stored && edge) stored = store_->add(*edge);
   if (stored && detection && detection->searchable_places > 0) stored = store_->add(detection->row());
-  if (std::string facts = to_text(known); stored && facts != session_.sensor) {
+  if (std::string facts = to_text(facts_); stored && facts != session_.sensor) {
     session_.sensor = std::move(facts);
     stored = store_->set(session_);
   }
@@ -156,8 +155,9 @@ Status SlamBackEnd::finish() {
   const Status stored = enter(graph_.decide_all(), entered);
   const Status settled = graph_.settle();
   const Status placed = stored && settled ? write_map_poses() : ok();
+  const Status learnt = stored && settled ? learn_look_alikes() : ok();
   const Status committed = store_->commit();
-  for (const Status* each : {&stored, &settled, &placed})
+  for (const Status* each : {&stored, &settled, &placed, &learnt})
     if (!*each) return *each;
   return committed;
 }
@@ -168,6 +168,16 @@ Status SlamBackEnd::write_map_poses() {
   for (const FrameId frame : graph_.keyframes())
     poses.push_back({frame, graph_.T_world_lidar(frame), graph_.part(frame)});
   return store_->set_map_poses(poses);
+}
+
+// For those who will look for scans in the map.
+Status SlamBackEnd::learn_look_alikes() {
+  const auto learnt = recognition_.learn_look_alikes_of_map(
+      [this](FrameId frame) { return point_in_map(graph_.T_world_lidar(frame), graph_.part(frame)); }, facts_.typical);
+  if (!learnt) return learnt.error();
+  facts_.look_alikes_log_odds = *learnt;
+  session_.sensor = to_text(facts_);
+  return store_->set(session_);
 }
 
 FrameTime SlamBackEnd::time_in_index(const FrameTime& frame) {
@@ -182,6 +192,9 @@ FrameTime SlamBackEnd::time_in_index(const FrameTime& frame) {
 
 Status SlamBackEnd::restore(const StoredMap& map, const StoredSession& session) {
   session_ = session;
+  const auto facts = to_sensor_facts(session.sensor);
+  if (!facts) return facts.error();
+  if (*facts) facts_ = **facts;
   if (map.keyframes.empty()) return ok();
   if (const Status status = restore_graph(map, graph_); !status) return status;
   return restore_places(*store_, map, parameters_.descriptor,

@@ -38,11 +38,13 @@ class SlamBackEnd {
   Result<Detection> find_loop(const PreparedScan& keyframe, const SensorFacts& sensor);
   KeyframeGraph::OdometryEdge edge_to(const TrajectoryPoint& point, const Matrix6& information) const;
   Status write_map_poses();
+  Status learn_look_alikes();
   Status enter(const std::vector<LoopGate::Decision>& decisions, std::size_t& entered);
 
   FrameTime time_in_index(const FrameTime& frame);
 
   StoredSession session_;
+  SensorFacts facts_;  ///< of this session
   Parameters parameters_;
   Odometry::Source source_;
   std::shared_ptr<MapStore> store_;

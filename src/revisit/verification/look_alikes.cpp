@@ -14,6 +14,7 @@ struct Tail {
   static constexpr double kRare = 1e-3;                    ///< share of the places elsewhere that would reach the end
   static constexpr double kUsualEnd = 3.0;                 ///< of the recordings that the model was learnt on
   static constexpr double kMostCaution = 3.0;              ///< log odds
+  static constexpr double kMostTrust = 3.0;                ///< in a map
   static constexpr double kDoubt = 30.0;                   ///< scores by which what is usual counts
 };
 
@@ -42,13 +43,17 @@ void LookAlikes::add(double log_odds) {
   known_.reset();
 }
 
-double LookAlikes::log_odds() const {
+double LookAlikes::correction(double most_trust) const {
   if (scores_.size() < Tail::kFewest) return 0.0;
-  if (!known_) {
-    const auto n = static_cast<double>(scores_.size());
-    known_ = n / (n + Tail::kDoubt) * std::clamp(Tail::kUsualEnd - end_of_tail(scores_), -Tail::kMostCaution, 0.0);
-  }
+  const auto n = static_cast<double>(scores_.size());
+  return n / (n + Tail::kDoubt) * std::clamp(Tail::kUsualEnd - end_of_tail(scores_), -Tail::kMostCaution, most_trust);
+}
+
+double LookAlikes::log_odds() const {
+  if (!known_) known_ = correction(0.0);
   return *known_;
 }
+
+double LookAlikes::log_odds_in_map() const { return correction(Tail::kMostTrust); }
 
 }  // namespace revisit

@@ -19,9 +19,15 @@ class LookAlikes {
   /// recordings that the model was learnt on, else, and until enough is known, nothing.
   double log_odds() const;
 
+  /// The same for scores of places that a finished map knows to be elsewhere: where these stay below what other
+  /// recordings have, more than nothing is added.
+  double log_odds_in_map() const;
+
   static constexpr double kNotRegistered = -20.0;
 
  private:
+  double correction(double most_trust) const;
+
   std::vector<double> scores_;  ///< the last ones, in order
   std::size_t next_ = 0;
   mutable std::optional<double> known_;

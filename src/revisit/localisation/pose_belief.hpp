@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <revisit/core/ids.hpp>
+#include <revisit/core/trajectory_point.hpp>
+
+namespace revisit {
+
+/// What several scans in a row say about where odometry's frame lies in a map, added up: one scan may fit at several
+/// places, the way from scan to scan fits at one. Belongs to one thread at a time.
+class PoseBelief {
+ public:
+  /// A pose at which one scan was registered.
+  struct Sighting {
+    FrameId match;
+    int part = 0;  ///< of the map
+    Pose T_map_lidar = Pose::Identity();
+    double log_odds = 0.0;  ///< by the evidence of this scan alone
+  };
+  struct Hypothesis {
+    FrameId match;  ///< of the last sighting
+    int part = 0;
+    Pose T_map_segment = Pose::Identity();  ///< of the odometry's segment
+    double log_odds = 0.0;
+  };
+
+  /// The scan at this point of the trajectory was registered at these poses. Scans of one view count once: evidence
+  /// grows with the metres travelled. Another segment begins anew.
+  void add(const TrajectoryPoint& point, std::span<const Sighting> sightings);
+  /// The likeliest, with the log odds that it is right and the others are wrong.
+  std::optional<Hypothesis> best() const;
+  void clear() { hypotheses_.clear(); }
+
+ private:
+  std::vector<Hypothesis> hypotheses_;
+  std::optional<TrajectoryPoint> last_;
+};
+
+}  // namespace revisit

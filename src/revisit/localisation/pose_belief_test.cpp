@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/localisation/pose_belief.hpp>
+
+#include <array>
+
+#include <gtest/gtest.h>
+
+namespace revisit {
+namespace {
+
+// A robot that drives along x; its odometry began at `start` of the map.
+struct Drive {
+  TrajectoryPoint point{.T_segment_lidar = Pose::Identity()};
+  Pose T_map_start = planar_pose(100, 50, 1.0);
+  PoseBelief belief;
+
+  PoseBelief::Sighting seen(double log_odds, const Pose& T_off = Pose::Identity(), std::int64_t match = 1) const {
+    return {{match}, 0, T_off * T_map_start * point.T_segment_lidar, log_odds};
+  }
+  void go(double metres) { point = point.after(planar_pose(metres, 0, 0)); }
+};
+
+TEST(PoseBelief, ViewsThatAreUnsureAddUp) {
+  Drive drive;
+  double before = -1.0;
+  for (int i = 0; i < 4; ++i) {
+    const auto sighting = drive.seen(1.2, Pose::Identity(), i);
+    drive.belief.add(drive.point, std::span(&sighting, 1));
+    const auto best = drive.belief.best();
+    ASSERT_TRUE(best);
+    EXPECT_GT(best->log_odds, before);
+    EXPECT_TRUE(best->T_map_segment.isApprox(drive.T_map_start, 1e-9));
+    EXPECT_EQ(best->match, FrameId{i});
+    before = best->log_odds;
+    drive.go(3.0);
+  }
+  EXPECT_GT(before, 4.0);
+}
+
+TEST(PoseBelief, TheSameViewCountsOnce) {
+  Drive drive;
+  for (int i = 0; i < 50; ++i) {
+    const auto sighting = drive.seen(1.0);
+    drive.belief.add(drive.point, std::span(&sighting, 1));
+  }
+  EXPECT_LT(drive.belief.best()->log_odds, 1.1);
+}
+
+// Two places look alike; further on only one of them fits.
+TEST(PoseBelief, OfTwoPlacesTheWayDecides) {
+  Drive drive;
+  const Pose T_other = planar_pose(40, 0, 0);
+  for (int i = 0; i < 3; ++i) {
+    const std::array both{drive.seen(4.0), drive.seen(4.0, T_other)};
+    drive.belief.add(drive.point, i < 2 ? std::span(both) : std::span(both).first(1));
+    if (i < 2) {
+      EXPECT_LT(drive.belief.best()->log_odds, 0.1) << "either may be right";
+    }
+    drive.go(3.0);
+  }
+  const auto best = drive.belief.best();
+  EXPECT_GT(best->log_odds, 3.0);
+  EXPECT_TRUE(best->T_map_segment.isApprox(drive.T_map_start, 1e-9));
+}
+
+TEST(PoseBelief, WhatNeverFitsWellNeverBecomesSure) {
+  Drive drive;
+  for (int i = 0; i < 30; ++i) {
+    const auto sighting = drive.seen(-3.0);
+    drive.belief.add(drive.point, std::span(&sighting, 1));
+    drive.go(3.0);
+    const auto best = drive.belief.best();
+    EXPECT_TRUE(!best || best->log_odds < 0.0);
+  }
+}
+
+TEST(PoseBelief, AnotherSegmentBeginsAnew) {
+  Drive drive;
+  const auto sighting = drive.seen(5.0);
+  drive.belief.add(drive.point, std::span(&sighting, 1));
+  drive.point.segment = 1;
+  drive.belief.add(drive.point, {});
+  EXPECT_FALSE(drive.belief.best());
+}
+
+}  // namespace
+}  // namespace revisit
