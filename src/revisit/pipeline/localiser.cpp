@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include <revisit/core/text.hpp>
 #include <revisit/preprocess/range_filter.hpp>
+#include <revisit/registration/sweep_motion.hpp>
 #include <revisit/store/sensor_facts.hpp>
 #include <revisit/store/stored_clouds.hpp>
 
@@ -22,6 +24,18 @@ struct Staying {
   static constexpr double kLost_s = 6.0;
   static constexpr double kDrift = 0.01;  ///< of odometry, a standard deviation for each metre
 };
+
+struct Moving {
+  static constexpr double kHopeless_log_odds = -15.0, kCertain_log_odds = 9.0;
+  static constexpr double kStill_m = 0.1, kArm_m = 10.0;  ///< within a sweep; a turn counts at this distance
+};
+
+double highest_log_odds(const Detection& detection) {
+  double highest = -std::numeric_limits<double>::infinity();
+  for (const Detection::Registered& each : detection.registered)
+    highest = std::max(highest, each.evidence.own_log_odds);
+  return highest;
+}
 
 // What a pose is known to be after so much odometry.
 Matrix6 after_motion(const Matrix6& information, double metres) {
@@ -72,8 +86,7 @@ Result<Localiser> Localiser::open(const std::filesystem::path& path, const Param
     localiser.recognition_.restore(place.frame, descriptor, point_in_map(T_map_lidar, opened.part(frame)));
     localiser.places_.push_back({frame, T_map_lidar.translation(), opened.part(frame)});
   };
-  if (const Status status = restore_places(*opened.store(), opened.stored(), parameters.descriptor, add_place);
-      !status)
+  if (const Status status = restore_places(*opened.store(), opened.stored(), parameters.descriptor, add_place); !status)
     return Error{path.string() + ": " + status.error().message};
   // What the last session knows: of several sensors, the one that was used last.
   for (const StoredSession& session : opened.stored().sessions) {
@@ -98,16 +111,48 @@ Localisation Localiser::found(FrameId frame, const LoopConstraint& loop) const {
 }
 
 Result<Localisation> Localiser::locate(Scan scan) {
-  const auto prepared = preparation_.prepare(std::move(scan));
+  const auto prepared = preparation_.prepare(scan);
   if (!prepared) return prepared.error();
   auto detection = recognition_.find(*prepared, places(), typical_);
   if (!detection) return detection.error();
+  const auto motion = motion_of(*prepared, *detection);
+  if (!motion) return motion.error();
+  if (*motion) {
+    // Once more, without what the motion did to it. The surer answer counts, as poses or as refusals do.
+    const auto undistorted = preparation_.prepare(std::move(scan), **motion);
+    if (undistorted) {
+      auto again = recognition_.find(*undistorted, places(), typical_);
+      if (!again) return again.error();
+      if (highest_log_odds(*again) > highest_log_odds(*detection)) detection = std::move(again);
+    }
+  }
   Localisation result;
   if (detection->loop) result = found(prepared->scan.frame, *detection->loop);
   result.frame = prepared->scan.frame;
   result.reason = detection->reason();
   result.detection = *std::move(detection);
   return result;
+}
+
+// How the sensor moved during a sweep that nobody followed, as the best place that was tried shows it. Nothing where
+// the scan is certain as it is, fits nowhere, or hardly moved.
+Result<std::optional<Twist>> Localiser::motion_of(const PreparedScan& scan, const Detection& detection) const {
+  const double log_odds = highest_log_odds(detection);
+  if (scan.scan.times_s.empty() || log_odds < Moving::kHopeless_log_odds || log_odds > Moving::kCertain_log_odds)
+    return std::optional<Twist>();
+  const auto best =
+      std::max_element(detection.registered.begin(), detection.registered.end(),
+                       [](const auto& a, const auto& b) { return a.evidence.own_log_odds < b.evidence.own_log_odds; });
+  const auto place = recognition_.geometry(best->match);
+  if (!place) return place.error();
+  const auto found = find_sweep_motion((*place)->surface(), scan.scan, best->evidence.T_match_query);
+  if (!found) return std::optional<Twist>();
+  const auto [first_s, last_s] = std::minmax_element(scan.scan.times_s.begin(), scan.scan.times_s.end());
+  const double sweep_s = static_cast<double>(*last_s - *first_s);
+  const bool is_still =
+      sweep_s * (found->motion.linear_mps.norm() + Moving::kArm_m * found->motion.angular_radps.norm()) <
+      Moving::kStill_m;
+  return is_still ? std::optional<Twist>() : std::optional(found->motion);
 }
 
 Result<Localisation> Localiser::follow(Scan scan, const std::optional<Pose>& T_external_lidar) {
@@ -137,8 +182,8 @@ Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const Trajecto
   if (!detection) return detection.error();
   std::vector<PoseBelief::Sighting> sightings;
   for (const Detection::Registered& each : detection->registered)
-    sightings.push_back({each.match, map_.part(each.match),
-                         map_.T_map_lidar(each.match) * each.evidence.T_match_query, each.evidence.own_log_odds});
+    sightings.push_back({each.match, map_.part(each.match), map_.T_map_lidar(each.match) * each.evidence.T_match_query,
+                         each.evidence.own_log_odds});
   belief_.add(point, sightings);
   Localisation result;
   result.reason = detection->reason();

@@ -29,8 +29,8 @@ struct Localisation {
   double probability = 0.0;         ///< that the pose is right (docs/accuracy.md)
   /// Of the pose relative to the key frame, as in LoopConstraint; of a predicted one, less for each metre.
   Matrix6 information = Matrix6::Zero();
-  FrameId match;       ///< the key frame of the map (in_map()) that it was registered with last
-  std::string reason;  ///< why it is lost or predicted only
+  FrameId match;        ///< the key frame of the map (in_map()) that it was registered with last
+  std::string reason;   ///< why it is lost or predicted only
   Detection detection;  ///< what locate() found out; of follow() only while it is lost
 };
 /// "lost", "found", "followed", "predicted".
@@ -58,6 +58,7 @@ class Localiser {
   Localiser(SavedMap map, const Parameters& parameters, LogSink log, const std::optional<IntensityScale>& scale);
   Result<Localisation> wake_up(const PreparedScan& scan, const TrajectoryPoint& point);
   Result<Localisation> stay(const PreparedScan& scan, const TrajectoryPoint& point);
+  Result<std::optional<Twist>> motion_of(const PreparedScan& scan, const Detection& detection) const;
   std::optional<PosePrediction> nearest_place(const Pose& T_map_lidar) const;
   Localisation found(FrameId frame, const LoopConstraint& loop) const;
 

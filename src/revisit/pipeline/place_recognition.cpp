@@ -69,6 +69,12 @@ Result<Hypothesis> PlaceRecognition::test(const PreparedScan& query, const PoseP
   return hypothesis;
 }
 
+Result<std::shared_ptr<const ScanGeometry>> PlaceRecognition::geometry(FrameId place) const {
+  const auto cloud = clouds_->get(place);
+  if (!cloud) return cloud.error();
+  return std::make_shared<const ScanGeometry>(**cloud);
+}
+
 Status PlaceRecognition::verify(const PreparedScan& query, const TypicalAgreement& typical, Detection& detection) {
   Stopwatch watch;
   const VerificationQuery question{query.scan.frame, query.descriptor, query.cloud, query.geometry,

@@ -33,6 +33,8 @@ class PlaceRecognition {
   /// `point_of` gives their poses in the map (point_in_map()). For set_look_alikes().
   Result<double> learn_look_alikes_of_map(const std::function<TrajectoryPoint(FrameId)>& point_of,
                                           const TypicalAgreement& typical);
+  /// What the scan of a place is registered onto.
+  Result<std::shared_ptr<const ScanGeometry>> geometry(FrameId place) const;
   /// Adds a place.
   Status add(PreparedScan place);
   /// A place whose cloud is kept already, of an earlier run.
