@@ -76,7 +76,8 @@ OdometryStep Odometry::match(const Scan& scan, double stamp_s, const std::option
     if (first_scan_) begin_map_again(*step.motion);
   }
   MatcherScan thinned = matcher_.thinned(step.compensated.empty() ? scan.points : step.compensated);
-  ScanMatch match = matcher_.match(stamp_s, thinned, T_previous_lidar ? T_previous_lidar : motion_by_imu(stamp_s));
+  ScanMatch match =
+      matcher_.match(stamp_s, thinned, T_previous_lidar ? T_previous_lidar : motion_by_imu(stamp_s), !T_previous_lidar);
   if (is_swept && match.prediction_error_m > Following::kWrong_m) {
     const Twist found = with_imu(twist_of(match.T_previous_found, stamp_s - last_stamp_s_));
     std::vector<Point> again = compensated(scan, found);

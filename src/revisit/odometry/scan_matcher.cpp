@@ -37,6 +37,7 @@ struct Matching {
   // harder than this.
   static constexpr double kHardlyFixed = 0.1;  ///< share of all that fixes the position
   static constexpr double kMostAcceleration_mps2 = 6.0, kJolt_m = 0.1;
+  static constexpr double kMostSlip = 0.6;        ///< of what wheels measure
   static constexpr double kNarrowSearch_m = 0.3;  ///< where a wide search found what cannot be
   // The first scans of a sparse sensor meet few surfaces; those that they meet must fit.
   static constexpr int kFirstScans = 5;
@@ -122,23 +123,26 @@ bool ScanMatcher::is_credible(double matched, double met) const {
                              typical_match_ - Matching::kBelowTypical);
 }
 
-ScanMatch ScanMatcher::match(double stamp_s, const MatcherScan& scan,
-                             const std::optional<Pose>& T_previous_lidar) const {
+ScanMatch ScanMatcher::match(double stamp_s, const MatcherScan& scan, const std::optional<Pose>& T_previous_lidar,
+                             bool is_guess) const {
   const double gap_s = stamp_s - last_stamp_s_;
   const bool extrapolates = motion_ && gap_s > 0.0 && gap_s <= Matching::kLongestExtrapolation_s;
   const Pose T_predicted = T_previous_lidar ? *T_previous_lidar
                            : extrapolates   ? motion_after(*motion_, gap_s)
                                             : Pose::Identity();
-  return match_within(map_ ? search_radius_m() : 0.0, stamp_s, scan, T_predicted);
+  std::optional<double> measured_m;
+  if (T_previous_lidar && !is_guess) measured_m = T_previous_lidar->translation().norm();
+  return match_within(map_ ? search_radius_m() : 0.0, stamp_s, scan, T_predicted, measured_m);
 }
 
 ScanMatch ScanMatcher::match_again(double stamp_s, const MatcherScan& scan, const ScanMatch& match) const {
-  return match_within(map_ ? fine_m() : 0.0, stamp_s, scan, match.T_previous_found);
+  return match_within(map_ ? fine_m() : 0.0, stamp_s, scan, match.T_previous_found, match.measured_m);
 }
 
-ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const MatcherScan& scan,
-                                    const Pose& T_predicted) const {
+ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const MatcherScan& scan, const Pose& T_predicted,
+                                    std::optional<double> measured_m) const {
   ScanMatch match;
+  match.measured_m = measured_m;
   match.T_previous_lidar = match.T_previous_found = T_predicted;
   match.T_odom_lidar = normalised(T_odom_lidar_ * T_predicted);
   if (!map_) {
@@ -160,6 +164,11 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
   // Since the last scan that was tracked: the longer ago, the farther may the sensor be from where it was predicted.
   const double untracked_s = stamp_s - tracked_stamp_s_;
   const auto is_possible = [&](const IcpResult& icp) {
+    // Wheels slip, but not like this: it is the surroundings that move along with the sensor.
+    const double found_m = (T_odom_tracked_.inverse() * icp.T_target_source).translation().norm();
+    if (measured_m &&
+        untracked_m_ + *measured_m - found_m > Matching::kJolt_m + Matching::kMostSlip * (untracked_m_ + *measured_m))
+      return false;
     if (!motion_ || gap_s <= 0.0) return true;
     const Pose surprise = (T_odom_lidar_ * T_predicted).inverse() * icp.T_target_source;
     return slid_m(icp.information, surprise.translation()) <=
@@ -219,7 +228,11 @@ void ScanMatcher::accept(double stamp_s, const MatcherScan& scan, const ScanMatc
         if (forgets) map->forget_far_from(here);
       });
   last_stamp_s_ = stamp_s;
-  if (match.is_tracked) tracked_stamp_s_ = stamp_s;
+  untracked_m_ = match.is_tracked ? 0.0 : untracked_m_ + match.measured_m.value_or(0.0);
+  if (match.is_tracked) {
+    tracked_stamp_s_ = stamp_s;
+    T_odom_tracked_ = match.T_odom_lidar;
+  }
   ++scans_;
 }
 
@@ -233,7 +246,8 @@ void ScanMatcher::restart() {
 
 void ScanMatcher::restore(double stamp_s, const Pose& T_odom_lidar, const std::optional<Twist>& motion) {
   last_stamp_s_ = tracked_stamp_s_ = stamp_s;
-  T_odom_lidar_ = T_odom_lidar;
+  T_odom_lidar_ = T_odom_tracked_ = T_odom_lidar;
+  untracked_m_ = 0.0;
   motion_ = motion;
   // How well scans typically match is to be learnt again.
   squared_prediction_error_m2_ = typical_match_ = 0.0;

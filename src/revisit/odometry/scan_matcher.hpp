@@ -29,6 +29,7 @@ struct ScanMatch {
   double matched = 0.0;                      ///< share of the scan's points that lie on a surface of the map
   double met = 0.0;                          ///< share with a surface of the map nearby at all
   double prediction_error_m = 0.0;           ///< of a point at the median range
+  std::optional<double> measured_m;          ///< what wheels say the sensor moved
   bool is_tracked = false;                   ///< otherwise the pose is the predicted one
 };
 
@@ -54,8 +55,10 @@ class ScanMatcher {
   /// Thins a scan (filtered by range, its sweep compensated).
   MatcherScan thinned(std::span<const Point> points) const;
   /// Matches the scan with the map. `T_previous_lidar`, if there is one, is the motion since the scan before as wheels
-  /// or another odometry measured it: the guess, and the answer where the map gives none.
-  ScanMatch match(double stamp_s, const MatcherScan& scan, const std::optional<Pose>& T_previous_lidar = {}) const;
+  /// or another odometry measured it: the guess, and the answer where the map gives none. `is_guess`: how far the
+  /// sensor went is not measured.
+  ScanMatch match(double stamp_s, const MatcherScan& scan, const std::optional<Pose>& T_previous_lidar = {},
+                  bool is_guess = false) const;
   /// Matches a scan that was found at `match` once more, after its sweep was compensated with the motion found there.
   ScanMatch match_again(double stamp_s, const MatcherScan& scan, const ScanMatch& match) const;
   /// Goes on from there: the scan enters the map, in the background.
@@ -70,7 +73,8 @@ class ScanMatcher {
 
  private:
   struct Insertion;
-  ScanMatch match_within(double radius_m, double stamp_s, const MatcherScan& scan, const Pose& T_predicted) const;
+  ScanMatch match_within(double radius_m, double stamp_s, const MatcherScan& scan, const Pose& T_predicted,
+                         std::optional<double> measured_m) const;
   double fine_m() const;
   double search_radius_m() const;
   bool is_credible(double matched, double met) const;
@@ -82,6 +86,8 @@ class ScanMatcher {
   std::optional<Twist> motion_;
   Eigen::Vector3f forgotten_from_ = Eigen::Vector3f::Zero();  ///< where the map was last cut to its reach
   double last_stamp_s_ = 0.0, range_m_ = 0.0;
+  double untracked_m_ = 0.0;                  ///< moved since the last scan that was tracked
+  Pose T_odom_tracked_ = Pose::Identity();    ///< of that one
   double tracked_stamp_s_ = 0.0;              ///< of the last scan that was tracked
   double squared_prediction_error_m2_ = 0.0;  ///< running mean
   double typical_match_ = 0.0;                ///< running mean of the share that met the map
