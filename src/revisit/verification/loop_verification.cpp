@@ -18,6 +18,11 @@ struct NearerPlace {
   static constexpr double kDecides = 0.5;       ///< share of the answer's distance below which the nearer one decides
 };
 
+struct StandingOut {
+  static constexpr double kFar_log_odds = 8.0;  ///< above the next one: nothing is like it
+  static constexpr double kMostTrust = 0.8;     ///< share of the caution that it then takes away
+};
+
 }  // namespace
 
 Result<std::optional<Hypothesis>> LoopVerification::verify(std::span<const LoopCandidate> candidates) {
@@ -36,6 +41,7 @@ Result<std::optional<Hypothesis>> LoopVerification::verify(std::span<const LoopC
     hypotheses_.push_back(*there);
   if (hypotheses_.empty()) return std::optional<Hypothesis>();
 
+  if (!query_.trajectory_point) trust_what_stands_out();
   weigh_against_each_other();
   std::optional<Hypothesis> best =
       *std::max_element(hypotheses_.begin(), hypotheses_.end(),
@@ -43,6 +49,24 @@ Result<std::optional<Hypothesis>> LoopVerification::verify(std::span<const LoopC
   if (best->is_accepted())
     if (const Status status = test_nearer_place(*best); !status) return status.error();
   return best;
+}
+
+// Places that are alike call for caution (LookAlikes). Of a scan alone in a finished map, those that look most like it
+// have been registered, too: the caution is for them, and a pose that fits far better than any other needs less of it.
+void LoopVerification::trust_what_stands_out() {
+  const double caution = -context_.look_alikes_log_odds;
+  if (caution <= 0.0) return;
+  for (Hypothesis& each : hypotheses_) {
+    if (!each.geometric) continue;
+    double next = StandingOut::kFar_log_odds;
+    for (const Hypothesis& other : hypotheses_)
+      if (&other != &each && other.geometric && exclude_each_other(each, other))
+        next = std::min(next, each.own_log_odds() - other.own_log_odds());
+    const double share = std::clamp(next / StandingOut::kFar_log_odds, 0.0, 1.0) * StandingOut::kMostTrust;
+    GeometricEvidence& found = *each.geometric;
+    decide(found, -caution * (1.0 - share), found.log_odds - found.own_log_odds, context_.parameters.geometric);
+    each.refusal = found.refusal;
+  }
 }
 
 // The query stands at one pose: what another explains better speaks against this one.

@@ -25,6 +25,7 @@ class LoopVerification {
  private:
   Result<std::optional<Hypothesis>> test_predicted_place();
   Status test_nearer_place(Hypothesis& answer);
+  void trust_what_stands_out();
   void weigh_against_each_other();
   bool exclude_each_other(const Hypothesis& a, const Hypothesis& b) const;
   bool is_sufficient(const Hypothesis& predicted) const;
