@@ -33,6 +33,7 @@ using Run = std::function<int()>;
 Run add_detect(CLI::App& program);
 Run add_slam(CLI::App& program);
 Run add_localise(CLI::App& program);
+Run add_merge(CLI::App& program);
 Run add_evaluate(CLI::App& program);
 Run add_compare(CLI::App& program);
 Run add_describe(CLI::App& program);

@@ -6,6 +6,7 @@
 
 #include <revisit/io/pose_file.hpp>
 #include <revisit/io/result_files.hpp>
+#include <revisit/localisation/saved_map.hpp>
 #include <revisit/store/map_store.hpp>
 
 #include "common.hpp"
@@ -22,6 +23,7 @@ namespace fs = std::filesystem;
 struct EvaluateOptions {
   std::string results, reference, recording, calibration;
   std::vector<std::string> map_references;
+  bool is_elsewhere = false;
   std::optional<int> exclude_frames;
   std::optional<double> exclude_s;
 };
@@ -160,7 +162,9 @@ int evaluate_localisation(const EvaluateOptions& options) {
       open_input(options.recording.empty() ? facts->input : options.recording, {.topic = facts->topic});
   const auto queries = load_reference(options, recording ? recording->get() : nullptr);
   if (!queries) return fail(queries.error());
-  const auto keyframes = true_keyframes(options, facts->database);
+  // Of a place that the map does not hold, no key frame is near.
+  const auto keyframes = options.is_elsewhere ? Result<std::map<FrameId, Pose>>(std::map<FrameId, Pose>())
+                                              : true_keyframes(options, facts->database);
   if (!keyframes) return fail(keyframes.error());
   const WakingTable table = evaluate_waking(*rows, *queries, *keyframes, {});
   std::cout << to_text(table, keyframes->size());
@@ -169,9 +173,24 @@ int evaluate_localisation(const EvaluateOptions& options) {
   return kDone;
 }
 
+// A map itself: table 6.
+int evaluate_map(const EvaluateOptions& options) {
+  const auto truth = true_keyframes(options, options.results);
+  if (!truth) return fail(truth.error());
+  const auto map = SavedMap::open(options.results);
+  if (!map) return fail(map.error());
+  std::map<FrameId, MapKeyframe> keyframes;
+  for (const auto& each : map->stored().keyframes)
+    keyframes[each.frame.frame] = {map->T_map_lidar(each.frame.frame), map->part(each.frame.frame)};
+  std::cout << to_text(evaluate_sessions(keyframes, *truth));
+  return kDone;
+}
+
 int evaluate(const EvaluateOptions& options) {
   const fs::path folder = options.results;
   std::error_code failure;
+  if (fs::is_regular_file(folder, failure) && is_map(folder)) return evaluate_map(options);
+  if (options.reference.empty()) return fail({"--reference is missing: the true poses"}, kUsage);
   if (fs::exists(folder / "localisation.csv", failure)) return evaluate_localisation(options);
   const auto candidates = read_candidates(folder / "candidates.csv");
   if (!candidates) return fail(candidates.error());
@@ -243,22 +262,27 @@ Run add_evaluate(CLI::App& program) {
   CLI::App* command = program.add_subcommand("evaluate", "Score results against reference poses, and draw them.");
   command->footer(
       "Prints table 1 (retrieval), table 2 (loop constraints) and, of `revisit slam`, table 3 (trajectory), or, of "
-      "`revisit localise`,\ntable 5 (waking up in a map), and "
+      "`revisit localise`,\ntable 5 (waking up in a map), of a map table 6 (sessions made one), and "
       "writes\n"
       "into DIR: report.html, precision_recall.png, trajectory.png, trajectories.png, evaluation.json. Works on the "
       "files of any program that writes\n"
       "candidates.csv and loops.csv (docs/formats.md).\n\n"
       "Example: revisit evaluate results/00 --reference kitti/poses/00.txt --camera-calibration "
       "kitti/sequences/00/calib.txt");
-  command->add_option("results", options->results, "Folder that `revisit detect` wrote")->required();
   command
-      ->add_option("--reference", options->reference,
-                   "Reference poses: a KITTI, TUM or g2o file, or a recording that has poses")
+      ->add_option("results", options->results,
+                   "Folder that `revisit detect`, `slam` or `localise` wrote, or a map (NAME.revisit)")
       ->required();
+  command->add_option("--reference", options->reference,
+                      "Reference poses: a KITTI, TUM or g2o file, or a recording that has poses");
   command->add_option("--recording", options->recording, "The recording, where it is not where run.json says");
   command->add_option("--map-reference", options->map_references,
                       "Reference poses of the map that `revisit localise` used, one for each of its sessions, in the "
                       "same world (default: those of the recordings that it was made of)");
+  command->add_flag(
+      "--elsewhere", options->is_elsewhere,
+      "The scans that `revisit localise` was given are of a place that the map does not hold: each answer "
+      "is false");
   command->add_option("--camera-calibration", options->calibration,
                       "calib.txt with the row Tr, for poses of a KITTI camera (default: beside the poses)");
   command->add_option("--exclude-frames", options->exclude_frames,

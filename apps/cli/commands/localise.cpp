@@ -80,7 +80,7 @@ Status localise_all(Localiser& localiser, const Recording& recording, bool each,
   for (std::size_t i = 0; i < recording.size() && !interrupted(); ++i) {
     auto scan = scans.next();
     Stopwatch watch;
-    auto found = !scan ? Result<Localisation>(scan.error())
+    auto found = !scan  ? Result<Localisation>(scan.error())
                  : each ? localiser.locate(*std::move(scan))
                         : localiser.follow(*std::move(scan), recording.wheel_pose(i));
     const double ms = watch.lap_ms();
@@ -99,7 +99,8 @@ Status localise_all(Localiser& localiser, const Recording& recording, bool each,
     if (row.is_answered()) output.poses.entries[row.frame] = {recording.stamp_s(i), row.T_map_lidar};
     if (const bool is_lost = row.status == "lost"; !each && is_lost != (status_before == "lost")) {
       progress.clear();
-      print_log()(LogLevel::kInfo, revisit::to_text(row.frame) + (is_lost ? ": lost: " + row.reason : ": " + in_words(row)));
+      print_log()(LogLevel::kInfo,
+                  revisit::to_text(row.frame) + (is_lost ? ": lost: " + row.reason : ": " + in_words(row)));
     }
     status_before = row.status;
     progress.update(i + 1);
@@ -156,7 +157,8 @@ int localise(const LocaliseOptions& options) {
 
 Run add_localise(CLI::App& program) {
   auto options = std::make_shared<LocaliseOptions>();
-  CLI::App* command = program.add_subcommand("localise", "Tell where a scan, or each scan of a recording, is in a map.");
+  CLI::App* command =
+      program.add_subcommand("localise", "Tell where a scan, or each scan of a recording, is in a map.");
   command->footer(
       "A scan is looked for in the whole map, without a prior: its pose is printed, or why it is not found (exit code "
       "3).\n"
@@ -168,7 +170,8 @@ Run add_localise(CLI::App& program) {
       "Example: revisit localise maps/00 scan.pcd\n"
       "         revisit localise maps/00 tuesday.bag --out where");
   command->add_option("map", options->map, "Map of `revisit slam`: the file, or the folder of --out")->required();
-  command->add_option("input", options->input, "A scan (.bin, .pcd, .ply, .las), or a recording as for `revisit detect`")
+  command
+      ->add_option("input", options->input, "A scan (.bin, .pcd, .ply, .las), or a recording as for `revisit detect`")
       ->required();
   command->add_option("--out", options->out, "Folder for the results of a recording");
   command->add_flag("--each", options->each, "Look for each scan of the recording alone, as if there were no other");

@@ -6,6 +6,7 @@
 
 #include <revisit/evaluation/loop_table.hpp>
 #include <revisit/evaluation/retrieval_table.hpp>
+#include <revisit/evaluation/session_table.hpp>
 #include <revisit/evaluation/trajectory_table.hpp>
 #include <revisit/evaluation/waking_table.hpp>
 
@@ -28,6 +29,8 @@ std::string to_json(const EvaluationReport& report);
 /// Table 5; `keyframes` are those of the map.
 std::string to_text(const WakingTable& table, std::size_t keyframes);
 std::string to_json(const WakingTable& table, std::size_t keyframes);
+/// Table 6.
+std::string to_text(const SessionTable& table);
 /// A page that shows the tables and the pictures beside it.
 std::string to_html(const EvaluationReport& report);
 

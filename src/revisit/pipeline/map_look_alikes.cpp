@@ -55,8 +55,7 @@ Result<double> PlaceRecognition::learn_look_alikes_of_map(const std::function<Tr
     double highest = LookAlikes::kNotRegistered;
     for (const Hypothesis& each : *tested) {
       if (!each.geometric) continue;
-      const Pose error =
-          T_between(point_of(each.candidate.match), here).inverse() * each.geometric->T_match_query;
+      const Pose error = T_between(point_of(each.candidate.match), here).inverse() * each.geometric->T_match_query;
       if (error.translation().norm() > Sampling::kRight_m || to_degrees(rotation_angle(error)) > Sampling::kRight_deg)
         highest = std::max(highest, loop_log_odds(each.geometric->evidence));
     }

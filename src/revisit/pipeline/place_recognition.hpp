@@ -41,6 +41,11 @@ class PlaceRecognition {
   void restore(const FrameTime& frame, const IntensityScanContext& descriptor,
                const std::optional<TrajectoryPoint>& point);
 
+  /// Where a place is, known better by now; frames that are no places are left out.
+  void set_point(FrameId place, const TrajectoryPoint& point) {
+    if (const auto found = points_.find(place); found != points_.end()) found->second = point;
+  }
+
   const PlaceIndex& index() const { return index_; }
   /// How much alike the places are (LookAlikes): as this run learnt, or as the map says.
   double look_alikes_log_odds() const { return look_alikes_of_map_ ? *look_alikes_of_map_ : look_alikes_.log_odds(); }

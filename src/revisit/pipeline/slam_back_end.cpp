@@ -59,31 +59,39 @@ Result<SlamBackEnd::Added> SlamBackEnd::add_keyframe(PreparedScan scan, const Od
       });
   added.detect_ms = watch.lap_ms();
 
+  facts_ = sensor;
+  Entry entry{{frame, stamp_s, odometry.T_odom_lidar, starts, {}, {}, std::move(map_cloud)}, point, std::nullopt};
+  if (!is_first) entry.edge = edge_to(point, odometry.information);
+  entry.place = std::move(scan);
+  if (const Status entered = enter_keyframe(std::move(entry), std::move(detection), added); !entered)
+    return entered.error();
+  return added;
+}
+
+Status SlamBackEnd::enter_keyframe(Entry entry, Result<Detection> detection, Added& added) {
+  Stopwatch watch;
+  const FrameId frame = entry.row.frame;
   std::optional<StoredEdge> edge;
-  if (is_first) {
-    graph_.add_keyframe(frame, point, std::nullopt);
-  } else {
-    const KeyframeGraph::OdometryEdge from_last = edge_to(point, odometry.information);
-    edge = StoredEdge{graph_.keyframes().back(), frame, from_last.T_last_new, from_last.information, {}};
-    graph_.add_keyframe(frame, point, from_last);
-  }
+  if (entry.edge)
+    edge = StoredEdge{graph_.keyframes().back(), frame, entry.edge->T_last_new, entry.edge->information, {}};
+  graph_.add_keyframe(frame, entry.point, entry.edge, entry.T_world_lidar);
   std::vector<LoopGate::Decision> decisions;
-  bool is_known_place = false;
+  bool is_known_place = !entry.place;
   if (detection && detection->loop) {
     decisions = graph_.offer(*detection->loop);
-    is_known_place = !decisions.empty() && is_near(detection->loop->T_match_query);
+    is_known_place = is_known_place || (!decisions.empty() && is_near(detection->loop->T_match_query));
   }
   for (LoopGate::Decision& decision : graph_.decide_overdue()) decisions.push_back(std::move(decision));
-  added.graph_ms = watch.lap_ms();
+  added.graph_ms += watch.lap_ms();
 
-  StoredKeyframe keyframe{frame, stamp_s, odometry.T_odom_lidar, starts, {}, {}, {}};
-  if (!is_known_place) {
-    keyframe.descriptor = to_bytes(scan.descriptor);
-    keyframe.place = to_bytes(scan.cloud);
-    keyframe.cloud = std::move(map_cloud);
+  StoredKeyframe& row = entry.row;
+  if (is_known_place) {
+    row.descriptor = row.place = row.cloud = {};
+  } else if (row.descriptor.empty()) {
+    row.descriptor = to_bytes(entry.place->descriptor);
+    row.place = to_bytes(entry.place->cloud);
   }
-  facts_ = sensor;
-  Status stored = store_->add(keyframe);
+  Status stored = store_->add(row);
   if (stored && edge) stored = store_->add(*edge);
   if (stored && detection && detection->searchable_places > 0) stored = store_->add(detection->row());
   if (std::string facts = to_text(facts_); stored && facts != session_.sensor) {
@@ -91,15 +99,44 @@ Result<SlamBackEnd::Added> SlamBackEnd::add_keyframe(PreparedScan scan, const Od
     stored = store_->set(session_);
   }
   if (stored) stored = enter(decisions, added.loops_entered);
-  if (stored && !is_known_place) stored = recognition_.add(std::move(scan));
-  if (!stored) return stored.error();
-  added.store_ms = watch.lap_ms();
+  if (stored && !is_known_place) stored = recognition_.add(*std::move(entry.place));
+  if (!stored) return stored;
+  added.store_ms += watch.lap_ms();
 
   if (const Status settled = graph_.settle_if_due(); !settled)
     log_to(log_, LogLevel::kWarning, settled.error().message);
   if (detection) added.detection = *std::move(detection);
   added.graph_ms += watch.lap_ms();
+  return ok();
+}
+
+Result<SlamBackEnd::Added> SlamBackEnd::add_entry(Entry entry, std::size_t places) {
+  Added added;
+  Result<Detection> detection = Error{};
+  if (entry.place) {
+    entry.place->trajectory_point = entry.point;
+    entry.place->scan.frame = entry.row.frame;
+    entry.place->scan.stamp_s = time_in_index({entry.row.frame, entry.row.stamp_s}).stamp_s;
+    if (places > 0) detection = recognition_.find(*entry.place, places, facts_.typical);
+  }
+  if (const Status entered = enter_keyframe(std::move(entry), std::move(detection), added); !entered)
+    return entered.error();
   return added;
+}
+
+Status SlamBackEnd::add_known_loop(const LoopConstraint& loop) {
+  graph_.restore_loop(loop, true);
+  return store_->add(StoredEdge{loop.match, loop.query, loop.T_match_query, loop.information, loop});
+}
+
+Status SlamBackEnd::begin_session(const StoredSession& session) {
+  if (!graph_.keyframes().empty())
+    if (const Status status = settle_session(); !status) return status;
+  session_ = session;
+  const auto facts = to_sensor_facts(session.sensor);
+  if (!facts) return facts.error();
+  facts_ = facts->value_or(SensorFacts{});
+  return store_->set(session_);
 }
 
 // Tracking was lost before this key frame: how it lies to the one before is not known.
@@ -147,6 +184,16 @@ Status SlamBackEnd::enter(const std::vector<LoopGate::Decision>& decisions, std:
     if (attaches)
       log_to(log_, LogLevel::kInfo, to_text(loop.query) + ": found again in the map, at " + to_text(loop.match));
   }
+  return ok();
+}
+
+// Places of earlier sessions then lie to each other as the map has them.
+Status SlamBackEnd::settle_session() {
+  std::size_t entered = 0;
+  if (Status stored = enter(graph_.decide_all(), entered); !stored) return stored;
+  if (Status settled = graph_.settle(); !settled) return settled;
+  for (const FrameId frame : graph_.keyframes())
+    recognition_.set_point(frame, point_in_map(graph_.T_world_lidar(frame), graph_.part(frame)));
   return ok();
 }
 

@@ -26,12 +26,26 @@ class SlamBackEnd {
   };
   /// An error where the store failed: it and the graph are then no longer the same.
   Result<Added> add_keyframe(PreparedScan scan, const OdometryStep& odometry, const SensorFacts& sensor);
+  /// A key frame of another map enters this one, and is looked for among the first `places` of it.
+  struct Entry {
+    StoredKeyframe row;  ///< the bytes of `place` need not be there
+    TrajectoryPoint point;
+    std::optional<KeyframeGraph::OdometryEdge> edge;  ///< from the key frame before; absent for the first of all
+    std::optional<Pose> T_world_lidar = {};           ///< where it is known
+    std::optional<PreparedScan> place = {};           ///< absent where the place was known
+  };
+  Result<Added> add_entry(Entry entry, std::size_t places);
+  /// A loop that another map holds, between key frames that entered this one.
+  Status add_known_loop(const LoopConstraint& loop);
+  /// What follows belongs to this session: after the first, decides about all loops that wait.
+  Status begin_session(const StoredSession& session);
   /// Decides about loops that wait for others, and settles the graph.
   Status finish();
   /// The map of before; `session` is the one that this run adds or continues.
   Status restore(const StoredMap& map, const StoredSession& session);
 
   const KeyframeGraph& graph() const { return graph_; }
+  std::size_t places() const { return recognition_.index().size(); }
 
  private:
   bool starts_segment(const TrajectoryPoint& point) const;
@@ -39,6 +53,8 @@ class SlamBackEnd {
   KeyframeGraph::OdometryEdge edge_to(const TrajectoryPoint& point, const Matrix6& information) const;
   Status write_map_poses();
   Status learn_look_alikes();
+  Status settle_session();
+  Status enter_keyframe(Entry entry, Result<Detection> detection, Added& added);
   Status enter(const std::vector<LoopGate::Decision>& decisions, std::size_t& entered);
 
   FrameTime time_in_index(const FrameTime& frame);

@@ -55,7 +55,7 @@ void KeyframeGraph::restore_loop(const LoopConstraint& loop, bool is_settled) {
   if (is_settled) gate_.join(loop);  // nothing is to be moved
   add_loop(loop);
   gate_.restore(loop);
-  if (is_settled) loops_unsettled_ = 0;
+  if (is_settled) --loops_unsettled_;
 }
 
 Status KeyframeGraph::settle_if_due() {

@@ -14,10 +14,9 @@ std::string to_text(const WakingTable& table, std::size_t keyframes) {
        "error median", "95 %", "median", "time median", "99 %"},
       {std::to_string(table.scans), std::to_string(table.in_map),
        table.in_map == 0 ? "-" : format("%.4f", table.share()), std::to_string(table.outside),
-       std::to_string(table.false_answers), std::to_string(table.false_outside),
-       format("%.3f m", table.median_error_m), format("%.3f m", table.p95_error_m),
-       format("%.2f deg", table.median_error_deg), format("%.1f ms", table.median_ms),
-       format("%.1f ms", table.p99_ms)}};
+       std::to_string(table.false_answers), std::to_string(table.false_outside), format("%.3f m", table.median_error_m),
+       format("%.3f m", table.p95_error_m), format("%.2f deg", table.median_error_deg),
+       format("%.1f ms", table.median_ms), format("%.1f ms", table.p99_ms)}};
   std::string text = "Table 5, waking up in a map of " + std::to_string(keyframes) + " key frames\n" + to_text(rows);
   text += "Scans:";
   for (const auto& [status, count] : table.statuses) text += " " + status + " " + std::to_string(count);
@@ -48,6 +47,20 @@ std::string to_json(const WakingTable& table, std::size_t keyframes) {
   json["p99_ms"] = table.p99_ms;
   json["statuses"] = table.statuses;
   return json.dump(2) + "\n";
+}
+
+std::string to_text(const SessionTable& table) {
+  Table rows = {{"session", "key frames", "part", "ATE alone", "ATE with the first of its part", ""}};
+  for (const SessionTable::Session& each : table.sessions)
+    rows.push_back({std::to_string(each.id), std::to_string(each.keyframes), std::to_string(each.part),
+                    format("%.3f m", each.ate_alone_m), format("%.3f m", each.ate_joined_m),
+                    each.is_wrong ? "wrong join" : ""});
+  std::string text = "Table 6, sessions made one\n" + to_text(rows);
+  text += std::to_string(table.joined) + " of " + std::to_string(table.sessions.size()) +
+          " sessions in the first part, " + std::to_string(table.wrong_joins) +
+          " wrong joins; ATE of all sessions together:";
+  for (const auto& [part, ate_m] : table.ate_m) text += format(" %.3f m (part %d)", ate_m, part);
+  return text + "\n";
 }
 
 }  // namespace revisit::cli

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <iostream>
+#include <memory>
+#include <set>
+
+#include <revisit/core/stopwatch.hpp>
+#include <revisit/pipeline/merge_maps.hpp>
+
+#include "common.hpp"
+#include "progress.hpp"
+#include "reports/table.hpp"
+
+namespace revisit::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct MergeOptions {
+  std::vector<std::string> maps;
+  std::string out;
+  ParameterFlags parameters;
+};
+
+int merge(const MergeOptions& options) {
+  const auto parameters = options.parameters.resolve();
+  if (!parameters) return fail(parameters.error(), kUsage);
+  if (const Status status = check_output(options.out, ".revisit"); !status) return fail(status.error(), kUsage);
+  const std::vector<fs::path> maps(options.maps.begin(), options.maps.end());
+  listen_for_interrupt();
+  std::unique_ptr<Progress> progress;
+  const auto report = merge_maps(maps, options.out, *parameters, print_log(), [&](std::size_t done, std::size_t of) {
+    if (!progress) progress = std::make_unique<Progress>("merge", "key frames", of);
+    progress->update(done);
+    return !interrupted();
+  });
+  progress.reset();
+  if (!report) return fail(report.error(), interrupted() ? kInterrupted : kFailed);
+
+  Table table = {{"session", "recording", "key frames", "loops to other sessions", "part of the map"}};
+  std::set<int> parts;
+  for (const MergeReport::Session& each : report->sessions) {
+    parts.insert(each.part);
+    table.push_back({std::to_string(each.id), each.recording, std::to_string(each.keyframes),
+                     std::to_string(each.loops), std::to_string(each.part)});
+  }
+  std::cout << to_text(table) << "Map: " << options.out << '\n';
+  if (parts.size() > 1)
+    print_log()(LogLevel::kWarning, "no loops join all sessions: the map has " + std::to_string(parts.size()) +
+                                        " parts, each with coordinates of its own; a recording that passes through "
+                                        "several of them joins them (slam --into)");
+  return kDone;
+}
+
+}  // namespace
+
+Run add_merge(CLI::App& program) {
+  auto options = std::make_shared<MergeOptions>();
+  CLI::App* command = program.add_subcommand("merge", "Make one map of several.");
+  command->footer(
+      "The sessions of the maps may be of other days, robots and sensors, and may have started anywhere: they are "
+      "joined by\n"
+      "loops that agree with each other. Those that have nothing in common stay apart, in the same file. The maps are "
+      "only read.\n\n"
+      "Example: revisit merge maps/monday maps/tuesday maps/robot2 --out site.revisit");
+  command->add_option("maps", options->maps, "Maps: files, or folders of `revisit slam --out`")->required();
+  command->add_option("--out", options->out, "The new map, NAME.revisit")->required();
+  options->parameters.add_to(*command);
+  return [options] { return merge(*options); };
+}
+
+}  // namespace revisit::cli

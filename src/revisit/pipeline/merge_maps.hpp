@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <revisit/config/parameters.hpp>
+#include <revisit/core/log.hpp>
+#include <revisit/core/result.hpp>
+
+namespace revisit {
+
+/// What became of the sessions of several maps.
+struct MergeReport {
+  struct Session {
+    int id = 0;             ///< in the new map
+    std::string recording;  ///< as its map named it
+    std::size_t keyframes = 0;
+    int part = 0;           ///< of the map: sessions of one part are joined, between parts nothing was found in common
+    std::size_t loops = 0;  ///< between it and sessions of the other maps
+  };
+  std::vector<Session> sessions;
+};
+
+/// Makes one map of several, whose sessions may have started anywhere: the key frames of each are looked for in those
+/// before it, and loops that agree with each other join them into one graph. Sessions without enough of them stay
+/// apart, in the same file. `out` is written whole or not at all, and must not exist. The parameters must be those of
+/// the maps' descriptors. `progress(done, of)` counts key frames and stops the work by returning false, which is an
+/// error.
+Result<MergeReport> merge_maps(std::span<const std::filesystem::path> maps, const std::filesystem::path& out,
+                               const Parameters& parameters = {}, const LogSink& log = {},
+                               const std::function<bool(std::size_t, std::size_t)>& progress = {});
+
+}  // namespace revisit
