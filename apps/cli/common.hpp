@@ -34,6 +34,9 @@ Run add_detect(CLI::App& program);
 Run add_slam(CLI::App& program);
 Run add_localise(CLI::App& program);
 Run add_merge(CLI::App& program);
+Run add_export(CLI::App& program);
+/// `revisit info` of a map.
+int info_of_map(const std::string& path, bool check);
 Run add_evaluate(CLI::App& program);
 Run add_compare(CLI::App& program);
 Run add_describe(CLI::App& program);

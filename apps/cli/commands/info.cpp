@@ -20,6 +20,7 @@ namespace {
 
 struct InfoOptions {
   std::string input, beside, picture;
+  bool check = false;
   InputFlags recording;
   ParameterFlags parameters;
 };
@@ -177,14 +178,16 @@ Run add_info(CLI::App& program) {
       "Of a bag: its topics, how often messages come, and what each is used for.\n\n"
       "Example: revisit info drive.bag; revisit info kitti/sequences/00; revisit info cloud.pcd\n"
       "         revisit info drive --beside kitti/sequences/00 --picture statistics.png");
-  command->add_option("input", options->input, "Recording or scan file")->required();
+  command->add_option("input", options->input, "Recording, scan file, or map")->required();
   command->add_option("--picture", options->picture, "Draw how the scans look on average into this .png");
+  command->add_flag("--check", options->check, "Of a map: read all of it, and say whether it is as it was written");
   command->add_option("--beside", options->beside, "Another recording to compare with");
   options->recording.add_to(*command);
   options->parameters.add_to(*command, {"preprocess", "intensity", "descriptor"});
   return [options]() -> int {
     const auto parameters = options->parameters.resolve();
     if (!parameters) return fail(parameters.error(), kUsage);
+    if (is_map(options->input)) return info_of_map(options->input, options->check);
     if (!options->picture.empty())
       if (const Status status = check_output(options->picture, ".png"); !status) return fail(status.error(), kUsage);
     const bool is_one = !is_recording(options->input);

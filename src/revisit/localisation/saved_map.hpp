@@ -21,6 +21,7 @@ class SavedMap {
   const Pose& T_map_lidar(FrameId keyframe) const { return graph_.T_world_lidar(keyframe); }
   /// Parts of the map that no loop joins have coordinates each.
   int part(FrameId keyframe) const { return graph_.part(keyframe); }
+  const PoseGraph& graph() const { return graph_.graph(); }
   const std::shared_ptr<MapStore>& store() const { return store_; }
 
  private:

@@ -191,8 +191,12 @@ Result<MapReport> build_map(const MapInput& input, const MapOptions& options, co
     report.tiles.push_back(*std::move(tile));
   }
   std::vector<CloudFile> maps;
-  maps.emplace_back(folder / "map.ply", CloudFormat::kPly, report.points);
-  maps.emplace_back(folder / "map.pcd", CloudFormat::kPcd, report.points);
+  for (const CloudFormat format : options.formats) {
+    const char* const name = format == CloudFormat::kPly   ? "map.ply"
+                             : format == CloudFormat::kPcd ? "map.pcd"
+                                                           : "map.las";
+    maps.emplace_back(folder / name, format, report.points);
+  }
   for (const MapTile& tile : report.tiles)
     if (const Status status = append_tile(tiles / tile.file, tile.points, maps); !status) return status.error();
   for (CloudFile& map : maps)

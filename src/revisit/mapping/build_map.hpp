@@ -10,6 +10,7 @@
 #include <revisit/core/pose.hpp>
 #include <revisit/core/result.hpp>
 #include <revisit/core/scan.hpp>
+#include <revisit/mapping/cloud_file.hpp>
 
 namespace revisit {
 
@@ -17,6 +18,8 @@ struct MapOptions {
   double voxel_m = 0.2;     ///< edge of the voxels: one point each
   double tile_m = 50.0;     ///< edge of a tile on the ground plane
   bool thin_moving = true;  ///< leave out what stood there for a moment only
+  /// Of the whole map, one file each: map.ply, map.pcd, map.las.
+  std::vector<CloudFormat> formats = {CloudFormat::kPly, CloudFormat::kPcd};
 };
 
 /// One tile of the map: a file that a viewer can load by itself.
@@ -41,7 +44,7 @@ struct MapInput {
 /// The map as points in the world's frame: one a voxel, without what moved. In memory at once.
 Result<std::vector<Point>> collect_map(const MapInput& input, const MapOptions& options);
 
-/// Puts key frames together into `folder`: map.ply, map.pcd, and tiles/ with a .ply a tile and tiles.json.
+/// Puts key frames together into `folder`: a file a format, and tiles/ with a .ply a tile and tiles.json.
 /// In memory are some key frames and one tile at a time. `progress(done)` counts key frames and stops the work
 /// by returning false: then nothing is written.
 Result<MapReport> build_map(const MapInput& input, const MapOptions& options, const std::filesystem::path& folder,

@@ -1,31 +1,98 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/mapping/cloud_file.hpp>
 
+#include <algorithm>
+#include <array>
 #include <cassert>
 #include <cerrno>
+#include <cmath>
+#include <cstdint>
 #include <cstring>
+#include <vector>
 
 namespace revisit {
+namespace {
+
+// ASPRS LAS 1.2, point format 0: the places of what is not zero.
+struct Las {
+  static constexpr std::size_t kHeadBytes = 227, kPointBytes = 20;
+  static constexpr double kScale_m = 0.001;
+  static constexpr float kFullIntensity = 65535.f;
+};
+
+template <typename Value>
+void put(std::span<char> bytes, std::size_t at, Value value) {
+  std::memcpy(bytes.data() + at, &value, sizeof value);
+}
+
+}  // namespace
 
 CloudFile::CloudFile(const std::filesystem::path& file, CloudFormat format, std::size_t count)
-    : file_(file), stream_(file, std::ios::binary | std::ios::trunc), left_(count) {
-  if (format == CloudFormat::kPly)
-    stream_ << "ply\nformat binary_little_endian 1.0\ncomment metres; intensity in [0, 1]\nelement vertex " << count
+    : file_(file), format_(format), stream_(file, std::ios::binary | std::ios::trunc), count_(count), left_(count) {
+  write_head();
+}
+
+void CloudFile::write_head() {
+  if (format_ == CloudFormat::kPly) {
+    stream_ << "ply\nformat binary_little_endian 1.0\ncomment metres; intensity in [0, 1]\nelement vertex " << count_
             << "\nproperty float x\nproperty float y\nproperty float z\nproperty float intensity\nend_header\n";
-  else
+  } else if (format_ == CloudFormat::kPcd) {
     stream_ << "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\n"
                "TYPE F F F F\nCOUNT 1 1 1 1\nWIDTH "
-            << count << "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " << count << "\nDATA binary\n";
+            << count_ << "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " << count_ << "\nDATA binary\n";
+  } else {
+    std::array<char, Las::kHeadBytes> head{};
+    std::memcpy(head.data(), "LASF", 4);
+    put(head, 24, std::uint8_t{1});
+    put(head, 25, std::uint8_t{2});
+    std::memcpy(head.data() + 58, "revisit", 7);
+    put(head, 94, static_cast<std::uint16_t>(Las::kHeadBytes));
+    put(head, 96, static_cast<std::uint32_t>(Las::kHeadBytes));
+    put(head, 105, static_cast<std::uint16_t>(Las::kPointBytes));
+    put(head, 107, static_cast<std::uint32_t>(count_));
+    put(head, 111, static_cast<std::uint32_t>(count_));  // all are first returns
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      put(head, 131 + 8 * axis, Las::kScale_m);
+      put(head, 179 + 16 * axis, highest_[static_cast<Eigen::Index>(axis)]);
+      put(head, 187 + 16 * axis, lowest_[static_cast<Eigen::Index>(axis)]);
+    }
+    stream_.write(head.data(), head.size());
+  }
+}
+
+void CloudFile::write_las_points(std::span<const Point> points) {
+  std::vector<char> bytes(points.size() * Las::kPointBytes);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Point& p = points[i];
+    const std::span<char> row(bytes.data() + i * Las::kPointBytes, Las::kPointBytes);
+    const Eigen::Vector3d position = Eigen::Vector3f(p.x, p.y, p.z).cast<double>();
+    const bool is_first = left_ == count_ && i == 0;
+    lowest_ = is_first ? position : lowest_.cwiseMin(position);
+    highest_ = is_first ? position : highest_.cwiseMax(position);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      put(row, 4 * axis,
+          static_cast<std::int32_t>(std::lround(position[static_cast<Eigen::Index>(axis)] / Las::kScale_m)));
+    put(row, 12, static_cast<std::uint16_t>(std::lround(Las::kFullIntensity * std::clamp(p.intensity, 0.f, 1.f))));
+    put(row, 14, std::uint8_t{0b001001});  // the first return of one
+  }
+  stream_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 
 void CloudFile::add(std::span<const Point> points) {
   assert(points.size() <= left_);
+  if (format_ == CloudFormat::kLas)
+    write_las_points(points);
+  else
+    stream_.write(reinterpret_cast<const char*>(points.data()), static_cast<std::streamsize>(points.size_bytes()));
   left_ -= points.size();
-  stream_.write(reinterpret_cast<const char*>(points.data()), static_cast<std::streamsize>(points.size_bytes()));
 }
 
 Status CloudFile::finish() {
   assert(left_ == 0);
+  if (format_ == CloudFormat::kLas) {  // its bounds are known by now
+    stream_.seekp(0);
+    write_head();
+  }
   stream_.close();
   if (stream_) return ok();
   return Error{file_.string() + ": cannot be written: " + std::strerror(errno)};

@@ -6,14 +6,17 @@
 #include <fstream>
 #include <span>
 
+#include <Eigen/Core>
+
 #include <revisit/core/result.hpp>
 #include <revisit/core/scan.hpp>
 
 namespace revisit {
 
-enum class CloudFormat { kPly, kPcd };
+enum class CloudFormat { kPly, kPcd, kLas };
 
-/// Writes points with intensity, binary, part by part: a cloud may be larger than memory.
+/// Writes points with intensity, binary, part by part: a cloud may be larger than memory. LAS (1.2, point format 0) has
+/// positions to a millimetre and intensities from 0 to 65535.
 class CloudFile {
  public:
   /// The header tells how many points follow: add() exactly `count`.
@@ -23,9 +26,14 @@ class CloudFile {
   Status finish();
 
  private:
+  void write_head();
+  void write_las_points(std::span<const Point> points);
+
   std::filesystem::path file_;
+  CloudFormat format_;
   std::ofstream stream_;
-  std::size_t left_;
+  std::size_t count_, left_;
+  Eigen::Vector3d lowest_ = Eigen::Vector3d::Zero(), highest_ = Eigen::Vector3d::Zero();
 };
 
 }  // namespace revisit

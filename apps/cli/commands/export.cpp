@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <iostream>
+#include <memory>
+#include <set>
+
+#include <revisit/core/text.hpp>
+#include <revisit/io/pose_file.hpp>
+#include <revisit/localisation/saved_map.hpp>
+#include <revisit/mapping/build_map.hpp>
+#include <revisit/mapping/occupancy_grid.hpp>
+#include <revisit/store/keyframe_bytes.hpp>
+
+#include "common.hpp"
+#include "progress.hpp"
+
+namespace revisit::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ExportOptions {
+  std::string map, out, as;
+  int part = 0;
+  OccupancyGrid::Options grid;
+  ParameterFlags parameters;
+};
+
+// The key frames of one part of the map.
+struct Part {
+  std::vector<FrameId> frames;
+  std::vector<Pose> poses;
+};
+
+Result<Part> find_part(const SavedMap& map, int number) {
+  Part part;
+  std::set<int> others;
+  for (const auto& each : map.stored().keyframes) {
+    const FrameId frame = each.frame.frame;
+    others.insert(map.part(frame));
+    if (map.part(frame) != number) continue;
+    part.frames.push_back(frame);
+    part.poses.push_back(map.T_map_lidar(frame));
+  }
+  if (!part.frames.empty()) return part;
+  std::string known;
+  for (const int each : others) known += " " + std::to_string(each);
+  return Error{"the map has no part " + std::to_string(number) + "; it has" + known};
+}
+
+Status export_points(const SavedMap& map, const Part& part, const ExportOptions& options, double voxel_m) {
+  const MapStore& store = *map.store();
+  const MapInput input{part.poses, [&](std::size_t i) { return read_map_points(store, part.frames[i]); }};
+  MapOptions how{.voxel_m = voxel_m, .formats = {}};
+  if (options.as == "ply") how.formats = {CloudFormat::kPly};
+  if (options.as == "pcd") how.formats = {CloudFormat::kPcd};
+  if (options.as == "las") how.formats = {CloudFormat::kLas};
+  Progress progress("export", "key frames", part.frames.size());
+  const auto report = build_map(input, how, options.out, [&](std::size_t done) {
+    progress.update(done);
+    return !interrupted();
+  });
+  if (!report) return report.error();
+  if (interrupted()) return Error{"interrupted; nothing was written"};
+  std::error_code failure;
+  if (options.as != "tiles") fs::remove_all(fs::path(options.out) / "tiles", failure);
+  return ok();
+}
+
+Status export_grid(const SavedMap& map, const Part& part, const ExportOptions& options) {
+  OccupancyGrid grid(options.grid);
+  Progress progress("export", "key frames", part.frames.size());
+  for (std::size_t i = 0; i < part.frames.size(); ++i) {
+    const auto points = read_map_points(*map.store(), part.frames[i]);
+    if (!points) return points.error();
+    const auto bytes = map.store()->part(part.frames[i], MapStore::Part::kPlace);
+    if (!bytes) return bytes.error();
+    progress.update(i + 1);
+    if (points->empty() || bytes->empty()) continue;
+    const auto place = to_thin_cloud(*bytes);
+    if (!place) return map.store()->damaged("place", part.frames[i]);
+    std::vector<Eigen::Vector3f> ground;
+    for (std::size_t k = 0; k < place->points.size(); ++k)
+      if (place->is_ground[k] != 0) ground.push_back(place->points[k]);
+    grid.add(part.poses[i], *points, ground);
+  }
+  return grid.write(fs::path(options.out) / "grid.yaml");
+}
+
+// A file a session: every scan of it, in the coordinates of the map.
+Status export_trajectories(const SavedMap& map, const Part& part, const ExportOptions& options) {
+  const std::set<FrameId> frames(part.frames.begin(), part.frames.end());
+  const auto scans = map.store()->scans();
+  if (!scans) return scans.error();
+  std::map<int, Trajectory> sessions;
+  for (const StoredScan& scan : *scans)
+    if (frames.contains(scan.keyframe))
+      sessions[session_of(scan.frame)].entries[in_recording(scan.frame)] = {
+          scan.stamp_s, map.T_map_lidar(scan.keyframe) * scan.T_keyframe_lidar};
+  for (const auto& [session, trajectory] : sessions)
+    if (const Status status =
+            write_tum_poses(fs::path(options.out) / ("session_" + std::to_string(session) + ".tum"), trajectory);
+        !status)
+      return status;
+  return ok();
+}
+
+int run_export(const ExportOptions& options) {
+  const auto parameters = options.parameters.resolve();
+  if (!parameters) return fail(parameters.error(), kUsage);
+  const auto map = SavedMap::open(options.map);
+  if (!map) return fail(map.error());
+  const auto part = find_part(*map, options.part);
+  if (!part) return fail({options.map + ": " + part.error().message});
+  std::error_code failure;
+  fs::create_directories(options.out, failure);
+  if (failure) return fail({options.out + ": cannot be created: " + failure.message()});
+  listen_for_interrupt();
+  const Status status = options.as == "grid"  ? export_grid(*map, *part, options)
+                        : options.as == "tum" ? export_trajectories(*map, *part, options)
+                        : options.as == "g2o" ? map->graph().write_g2o(fs::path(options.out) / "graph.g2o")
+                                              : export_points(*map, *part, options, parameters->slam.map_voxel_m);
+  if (!status) return fail(status.error(), interrupted() ? kInterrupted : kFailed);
+  std::cout << part->frames.size() << " key frames as " << options.as << ": " << options.out << '\n';
+  return kDone;
+}
+
+}  // namespace
+
+Run add_export(CLI::App& program) {
+  auto options = std::make_shared<ExportOptions>();
+  CLI::App* command = program.add_subcommand("export", "Write a map in a form that other programs read.");
+  command->footer(
+      "  ply, pcd, las  the points: map.ply, map.pcd, map.las\n"
+      "  tiles          the points in squares of 50 m, with tiles.json\n"
+      "  grid           grid.pgm and grid.yaml: what is free, occupied and unknown, for navigation in two dimensions\n"
+      "  tum            the trajectory of each session: session_0.tum, ...\n"
+      "  g2o            the pose graph of all sessions: graph.g2o\n\n"
+      "Example: revisit export maps/00 --as grid --out nav");
+  command->add_option("map", options->map, "Map: the file, or the folder of `revisit slam --out`")->required();
+  command->add_option("--as", options->as, "Form")
+      ->required()
+      ->check(CLI::IsMember({"ply", "pcd", "las", "tiles", "grid", "tum", "g2o"}));
+  command->add_option("--out", options->out, "Folder for the files")->required();
+  command->add_option("--part", options->part, "Of a map whose sessions are not all joined: which part (see info)");
+  command->add_option("--cell", options->grid.cell_m, "grid: edge of a cell, m")->check(CLI::Range(0.02, 5.0));
+  command->add_option("--clearance", options->grid.clearance_m, "grid: what is lower is driven over, m")
+      ->check(CLI::Range(0.0, 2.0));
+  command->add_option("--height", options->grid.height_m, "grid: what is higher is driven under, m")
+      ->check(CLI::Range(0.1, 20.0));
+  options->parameters.add_to(*command, {"slam"});
+  return [options] { return run_export(*options); };
+}
+
+}  // namespace revisit::cli
