@@ -85,6 +85,31 @@ TEST(BuildMap, KeepsWhatStaysAndLeavesOutWhatMoves) {
   EXPECT_GT(unfiltered->points, report->points + 1500);
 }
 
+// As the ASPRS's table of LAS 1.2 has it.
+TEST(CloudFile, LasHasItsBoundsAndItsPoints) {
+  const fs::path file = fresh_folder("las") / "map.las";
+  CloudFile las(file, CloudFormat::kLas, 3);
+  const std::vector<Point> points{{1.5f, -2.25f, 0.125f, 1.f}, {-10.f, 4.f, 3.f, 0.f}, {0.f, 0.f, -1.f, 0.5f}};
+  las.add(std::span(points).first(2));
+  las.add(std::span(points).last(1));
+  ASSERT_TRUE(las.finish());
+  std::ifstream stream(file, std::ios::binary);
+  const std::string all{std::istreambuf_iterator<char>(stream), {}};
+  ASSERT_EQ(all.size(), 227u + 3 * 20);
+  const auto at = [&]<typename T>(T value, std::size_t offset) {
+    std::memcpy(&value, all.data() + offset, sizeof value);
+    return value;
+  };
+  EXPECT_EQ(all.substr(0, 4), "LASF");
+  EXPECT_EQ(at(std::uint32_t{}, 107), 3u);
+  EXPECT_EQ(at(double{}, 179), 1.5) << "largest x";
+  EXPECT_EQ(at(double{}, 187), -10.0) << "smallest x";
+  EXPECT_EQ(at(double{}, 219), -1.0) << "smallest z";
+  EXPECT_EQ(at(std::int32_t{}, 227), 1500);
+  EXPECT_EQ(at(std::int32_t{}, 227 + 4), -2250);
+  EXPECT_EQ(at(std::uint16_t{}, 227 + 12), 65535);
+}
+
 TEST(BuildMap, TilesHoldTheWholeMapOnce) {
   const fs::path folder = fresh_folder("tiles");
   const auto report =

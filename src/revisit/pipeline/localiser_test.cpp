@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/pipeline/localiser.hpp>
 
+#include <algorithm>
 #include <fstream>
 
 #include <gtest/gtest.h>
@@ -58,6 +59,51 @@ TEST(Localiser, OneScanAnswersFromTheMapOfAnEarlierRun) {
   ASSERT_TRUE(elsewhere);
   EXPECT_FALSE(elsewhere->T_map_lidar);
   EXPECT_FALSE(elsewhere->detection.reason().empty());
+}
+
+// Found, followed, carried elsewhere, found again.
+TEST(Localiser, FollowsADriveAndFindsAKidnappedRobotAgain) {
+  auto localiser = Localiser::open(small_map());
+  ASSERT_TRUE(localiser) << localiser.error().message;
+  int found = 0, followed = 0, lost = 0;
+  double worst_m = 0.0;
+  for (int i = 0; i < 40; ++i) {
+    const int at = i < 20 ? i : i + 15;  // 12 m farther on, at once
+    const Pose T_world_query = SyntheticWorld::at(-20.0 + 0.6 * at, 0.4, 0.05);
+    Scan scan = town().scan(T_world_query, kSensor, static_cast<unsigned>(500 + i));
+    scan.frame = FrameId{i};
+    scan.stamp_s = 0.1 * i;
+    const auto step = localiser->follow(std::move(scan));
+    ASSERT_TRUE(step) << step.error().message;
+    EXPECT_EQ(step->frame, FrameId{i});
+    found += step->status == Localisation::Status::kFound;
+    followed += step->status == Localisation::Status::kFollowed;
+    lost += step->status == Localisation::Status::kLost;
+    ASSERT_EQ(step->T_map_lidar.has_value(), step->status != Localisation::Status::kLost);
+    if (step->status != Localisation::Status::kFollowed) continue;
+    EXPECT_FALSE(step->information.isZero());
+    worst_m = std::max(
+        worst_m, ((pose_at(0).inverse() * T_world_query).inverse() * *step->T_map_lidar).translation().norm());
+  }
+  EXPECT_GE(found, 1);
+  EXPECT_LE(lost, 8) << "found again in time";
+  EXPECT_GE(followed, 24);
+  EXPECT_LT(worst_m, 0.2);
+}
+
+TEST(Localiser, SaysThatItHasLeftTheMap) {
+  auto localiser = Localiser::open(small_map());
+  ASSERT_TRUE(localiser);
+  Localisation last;
+  for (int i = 0; i < 60; ++i) {  // away from the mapped road, to the side
+    Scan scan = town().scan(SyntheticWorld::at(0.0, 1.0 * i, kPi / 2), kSensor, static_cast<unsigned>(700 + i));
+    scan.frame = FrameId{i};
+    scan.stamp_s = 0.1 * i;
+    auto step = localiser->follow(std::move(scan));
+    if (step) last = *std::move(step);
+  }
+  EXPECT_EQ(last.status, Localisation::Status::kLost);
+  EXPECT_FALSE(last.reason.empty());
 }
 
 TEST(Localiser, SaysWhatIsWrongWithAMap) {

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+// Several sessions in one map: added one after the other, or merged.
+#include <fstream>
+#include <functional>
+
+#include <gtest/gtest.h>
+
+#include <revisit/localisation/saved_map.hpp>
+#include <revisit/pipeline/merge_maps.hpp>
+#include <revisit/pipeline/slam.hpp>
+
+#include "shared_data.hpp"
+#include "synthetic_world.hpp"
+
+namespace revisit {
+namespace {
+
+namespace fs = std::filesystem;
+using testing_support::fresh_folder;
+using testing_support::SyntheticWorld;
+
+const SyntheticWorld::Sensor kSixteenLines{16, 360, -20.0, 6.0};
+constexpr int kSessionScans = 60;
+constexpr double kSessionStep_m = 0.7;
+
+// Sessions drive the same road: there, and back beside it.
+Pose there(int i) { return SyntheticWorld::at(-20.0 + kSessionStep_m * i, 0.0, 0.0); }
+Pose back(int i) { return SyntheticWorld::at(22.0 - kSessionStep_m * i, 0.8, kPi); }
+
+using PoseOf = std::function<Pose(int)>;
+std::unique_ptr<Slam> drive(const fs::path& folder, const PoseOf& pose_of, int world, bool new_session = false) {
+  SlamSetup setup;
+  setup.scale.emplace().full_scale = 1.0;
+  setup.new_session = new_session;
+  setup.recording = folder.string();
+  auto slam = Slam::open(folder, {}, setup);
+  EXPECT_TRUE(slam) << slam.error().message;
+  if (!slam) return nullptr;
+  const SyntheticWorld town(static_cast<unsigned>(world));
+  for (int i = 0; i < kSessionScans; ++i) {
+    Scan scan = town.scan(pose_of(i), kSixteenLines, static_cast<unsigned>(world * 1000 + i));
+    scan.frame = FrameId{i};
+    scan.stamp_s = 0.1 * i;
+    EXPECT_TRUE(slam->process(std::move(scan)));
+  }
+  EXPECT_TRUE(slam->finish());
+  return std::make_unique<Slam>(*std::move(slam));
+}
+
+// How far the map has the last key frame of session b from where the truth has it, seen from the first one of a.
+double off_m(const SavedMap& map, int a, const PoseOf& pose_a, int b, const PoseOf& pose_b) {
+  std::optional<FrameId> first, last;
+  for (const auto& each : map.stored().keyframes) {
+    const FrameId frame = each.frame.frame;
+    if (session_of(frame) == a && !first) first = frame;
+    if (session_of(frame) == b) last = frame;
+  }
+  const Pose truth = pose_a(static_cast<int>(in_recording(*first).value)).inverse() *
+                     pose_b(static_cast<int>(in_recording(*last).value));
+  return (truth.inverse() * map.T_map_lidar(*first).inverse() * map.T_map_lidar(*last)).translation().norm();
+}
+
+TEST(MapSessions, ASecondSessionIsFoundInTheMap) {
+  const fs::path folder = fresh_folder();
+  std::size_t places_before = 0;
+  {
+    const auto first = drive(folder, there, 61);
+    ASSERT_TRUE(first);
+    places_before = first->graph().keyframes().size();
+  }
+  {
+    const auto second = drive(folder, back, 61, true);
+    ASSERT_TRUE(second);
+    EXPECT_EQ(second->session(), 1);
+    EXPECT_TRUE(second->is_joined());
+    EXPECT_EQ(second->last_frame(), FrameId{kSessionScans - 1});
+    const auto trajectories = second->trajectories();
+    ASSERT_TRUE(trajectories);
+    EXPECT_EQ(trajectories->corrected.entries.size(), std::size_t{kSessionScans}) << "of this session alone";
+    EXPECT_TRUE(trajectories->corrected.at({5}));
+  }
+  const auto map = SavedMap::open(folder);
+  ASSERT_TRUE(map) << map.error().message;
+  ASSERT_EQ(map->stored().sessions.size(), 2u);
+  EXPECT_GT(map->stored().keyframes.size(), places_before);
+  EXPECT_EQ(map->part(map->stored().keyframes.back().frame.frame), 0);
+  EXPECT_LT(off_m(*map, 0, there, 1, back), 0.3);
+}
+
+TEST(MapSessions, AnInterruptedSessionGoesOn) {
+  const fs::path folder = fresh_folder();
+  (void)drive(folder, there, 61);
+  {
+    SlamSetup setup;
+    setup.scale.emplace().full_scale = 1.0;
+    setup.new_session = true;
+    auto slam = Slam::open(folder, {}, setup);
+    ASSERT_TRUE(slam);
+    Scan scan = SyntheticWorld(61).scan(back(0), kSixteenLines, 1);
+    ASSERT_TRUE(slam->process(std::move(scan)));
+  }
+  SlamSetup setup;
+  setup.scale.emplace().full_scale = 1.0;
+  auto slam = Slam::open(folder, {}, setup);
+  ASSERT_TRUE(slam) << slam.error().message;
+  EXPECT_EQ(slam->session(), 1);
+  EXPECT_EQ(slam->last_frame(), FrameId{0});
+  Scan scan = SyntheticWorld(61).scan(back(1), kSixteenLines, 2);
+  scan.frame = FrameId{1};
+  scan.stamp_s = 0.1;
+  EXPECT_TRUE(slam->process(std::move(scan)));
+}
+
+TEST(MapSessions, AnotherPlaceWaitsBesideTheMap) {
+  const fs::path folder = fresh_folder();
+  (void)drive(folder, there, 61);
+  const auto second = drive(folder, there, 77, true);
+  ASSERT_TRUE(second);
+  EXPECT_FALSE(second->is_joined());
+}
+
+TEST(MergeMaps, JoinsWhatBelongsTogetherAndNothingElse) {
+  const fs::path folder = fresh_folder(), out = folder / "all.revisit";
+  (void)drive(folder / "a", there, 61);
+  (void)drive(folder / "b", there, 77);
+  (void)drive(folder / "c", back, 61);
+  const std::vector<fs::path> maps{folder / "a", folder / "b", folder / "c"};
+  std::size_t last_done = 0, all = 0;
+  const auto report = merge_maps(maps, out, {}, {}, [&](std::size_t done, std::size_t of) {
+    EXPECT_EQ(done, last_done + 1);
+    last_done = done;
+    all = of;
+    return true;
+  });
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_EQ(last_done, all);
+  ASSERT_EQ(report->sessions.size(), 3u);
+  EXPECT_EQ(report->sessions[0].part, 0);
+  EXPECT_NE(report->sessions[1].part, 0);
+  EXPECT_EQ(report->sessions[2].part, 0);
+  EXPECT_GE(report->sessions[2].loops, 6u);
+  EXPECT_EQ(report->sessions[1].loops, 0u);
+  const auto map = SavedMap::open(out);
+  ASSERT_TRUE(map) << map.error().message;
+  EXPECT_TRUE(map->store()->check());
+  EXPECT_LT(off_m(*map, 0, there, 2, back), 0.3);
+  EXPECT_EQ(map->store()->scans()->size(), 3u * kSessionScans);
+
+  EXPECT_FALSE(merge_maps(maps, out)) << "exists already";
+}
+
+// The new file is there whole or not at all; the old ones stay as they are.
+TEST(MergeMaps, WhatEndsEarlyLeavesNothing) {
+  const fs::path folder = fresh_folder(), out = folder / "all.revisit";
+  (void)drive(folder / "a", there, 61);
+  const std::vector<fs::path> maps{folder / "a", folder / "a"};
+  const auto stopped = merge_maps(maps, out, {}, {}, [](std::size_t done, std::size_t) { return done < 30; });
+  ASSERT_FALSE(stopped);
+  EXPECT_FALSE(fs::exists(out));
+  EXPECT_FALSE(fs::exists(out.string() + ".part"));
+  const std::vector<fs::path> missing{folder / "a", folder / "nowhere"};
+  const auto nowhere = merge_maps(missing, out);
+  ASSERT_FALSE(nowhere);
+  EXPECT_NE(nowhere.error().message.find("nowhere"), std::string::npos);
+  Parameters other;
+  other.descriptor.sectors = 60;
+  EXPECT_FALSE(merge_maps(maps, out, other));
+  EXPECT_FALSE(fs::exists(out));
+}
+
+}  // namespace
+}  // namespace revisit
