@@ -133,8 +133,10 @@ LocalisationWriter::~LocalisationWriter() = default;
 Status LocalisationWriter::add(const LocalisationRow& row) {
   auto& out = file_->text.stream();
   out << row.frame.value << ',' << row.status << ',';
-  if (row.is_answered()) out << session_of(row.match) << ',' << in_recording(row.match).value;
-  else out << ',';
+  if (row.is_answered())
+    out << session_of(row.match) << ',' << in_recording(row.match).value;
+  else
+    out << ',';
   for (const Pose* T : {&row.T_map_lidar, &row.T_match_lidar}) {
     const Eigen::Vector3d t = T->translation();
     const Eigen::Quaterniond q = Eigen::Quaterniond(T->rotation()).normalized();
@@ -210,16 +212,20 @@ Result<std::vector<LocalisationRow>> read_localisation(const fs::path& file) {
     if (cells.size() != 23) return false;
     LocalisationRow row;
     const auto query = frame(cells[0]);
-    const auto ms = number(cells[21]), probability = number(cells[18]);
-    if (!query || !ms || !probability) return false;
+    const auto probability = number(cells[18]), deviation_m = number(cells[19]), deviation_deg = number(cells[20]),
+               ms = number(cells[21]);
+    if (!query || !probability || !deviation_m || !deviation_deg || !ms) return false;
     row.frame = *query;
     row.status = cells[1];
     row.probability = *probability;
+    row.deviation_m = *deviation_m;
+    row.deviation_deg = *deviation_deg;
     row.ms = *ms;
     row.reason = cells[22];
     if (row.is_answered()) {
       const auto session = frame(cells[2]), match = frame(cells[3]);
-      if (!session || !match || session->value < 0 || session->value > INT16_MAX || !fits_into_map(*match)) return false;
+      if (!session || !match || session->value < 0 || session->value > INT16_MAX || !fits_into_map(*match))
+        return false;
       row.match = in_map(static_cast<int>(session->value), *match);
       for (const auto& [T, first] : {std::pair{&row.T_map_lidar, std::size_t{4}}, {&row.T_match_lidar, 11}}) {
         std::array<double, 7> v{};

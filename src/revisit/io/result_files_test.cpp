@@ -96,5 +96,39 @@ TEST(CalibrationFile, ReadsBackAndRefusesNonsense) {
   }
 }
 
+TEST(LocalisationFile, GivesBackWhatItWasGiven) {
+  const fs::path file = fresh_folder() / "localisation.csv";
+  LocalisationRow found;
+  found.frame = {7};
+  found.status = "followed";
+  found.match = in_map(3, {12});
+  found.T_map_lidar = planar_pose(1.25, -2.5, 0.5);
+  found.T_match_lidar = planar_pose(0.5, 0.25, -0.125);
+  found.probability = 0.998;
+  found.deviation_m = 0.01;
+  found.deviation_deg = 0.02;
+  found.ms = 12.5;
+  LocalisationRow lost;
+  lost.frame = {8};
+  lost.status = "lost";
+  lost.reason = "probability 0.2, too low";
+  {
+    LocalisationWriter writer(file);
+    ASSERT_TRUE(writer.add(found) && writer.add(lost) && writer.finish());
+  }
+  const auto rows = read_localisation(file);
+  ASSERT_TRUE(rows) << rows.error().message;
+  ASSERT_EQ(rows->size(), 2u);
+  EXPECT_EQ((*rows)[0].match, in_map(3, {12}));
+  EXPECT_TRUE((*rows)[0].T_map_lidar.isApprox(found.T_map_lidar, 1e-8));
+  EXPECT_TRUE((*rows)[0].T_match_lidar.isApprox(found.T_match_lidar, 1e-8));
+  EXPECT_EQ((*rows)[0].deviation_m, 0.01);
+  EXPECT_EQ((*rows)[0].ms, 12.5);
+  EXPECT_FALSE((*rows)[1].is_answered());
+  EXPECT_EQ((*rows)[1].reason, "probability 0.2; too low") << "no comma in a cell";
+  std::ofstream(file, std::ios::app) << "9,found,0,x\n";
+  EXPECT_FALSE(read_localisation(file));
+}
+
 }  // namespace
 }  // namespace revisit

@@ -25,6 +25,12 @@ struct Staying {
   static constexpr double kDrift = 0.01;  ///< of odometry, a standard deviation for each metre
 };
 
+struct Nearby {
+  static constexpr double kWorthwhile_log_odds = -4.0;
+  static constexpr std::size_t kPlaces = 4;
+  static constexpr double kSame_m = 1.0;  ///< the same pose
+};
+
 struct Moving {
   static constexpr double kHopeless_log_odds = -15.0, kCertain_log_odds = 9.0;
   static constexpr double kStill_m = 0.1, kArm_m = 10.0;  ///< within a sweep; a turn counts at this distance
@@ -111,7 +117,7 @@ Localisation Localiser::found(FrameId frame, const LoopConstraint& loop) const {
 }
 
 Result<Localisation> Localiser::locate(Scan scan) {
-  const auto prepared = preparation_.prepare(scan);
+  auto prepared = preparation_.prepare(scan);
   if (!prepared) return prepared.error();
   auto detection = recognition_.find(*prepared, places(), typical_);
   if (!detection) return detection.error();
@@ -119,13 +125,17 @@ Result<Localisation> Localiser::locate(Scan scan) {
   if (!motion) return motion.error();
   if (*motion) {
     // Once more, without what the motion did to it. The surer answer counts, as poses or as refusals do.
-    const auto undistorted = preparation_.prepare(std::move(scan), **motion);
+    auto undistorted = preparation_.prepare(std::move(scan), **motion);
     if (undistorted) {
       auto again = recognition_.find(*undistorted, places(), typical_);
       if (!again) return again.error();
-      if (highest_log_odds(*again) > highest_log_odds(*detection)) detection = std::move(again);
+      if (highest_log_odds(*again) > highest_log_odds(*detection)) {
+        detection = std::move(again);
+        prepared = std::move(undistorted);
+      }
     }
   }
+  if (const Status looked = look_nearby(*prepared, *detection); !looked) return looked.error();
   Localisation result;
   if (detection->loop) result = found(prepared->scan.frame, *detection->loop);
   result.frame = prepared->scan.frame;
@@ -214,17 +224,48 @@ Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const Trajecto
   return result;
 }
 
-std::optional<PosePrediction> Localiser::nearest_place(const Pose& T_map_lidar) const {
-  const Place* nearest = nullptr;
-  double squared_m2 = std::pow(Staying::kFar_m, 2);
+std::vector<PosePrediction> Localiser::nearest_places(const Pose& T_map_lidar, int part, std::size_t count) const {
+  std::vector<std::pair<double, const Place*>> nearest;
   for (const Place& each : places_) {
     const double distance_m2 = (each.position_m - T_map_lidar.translation()).squaredNorm();
-    if (each.part != following_->part || distance_m2 >= squared_m2) continue;
-    squared_m2 = distance_m2;
-    nearest = &each;
+    if (each.part != part || distance_m2 >= std::pow(Staying::kFar_m, 2)) continue;
+    if (nearest.size() == count && distance_m2 >= nearest.back().first) continue;
+    if (nearest.size() == count) nearest.pop_back();
+    nearest.insert(std::upper_bound(nearest.begin(), nearest.end(), std::pair(distance_m2, &each)),
+                   {distance_m2, &each});
   }
-  if (nearest == nullptr) return std::nullopt;
-  return PosePrediction{nearest->frame, map_.T_map_lidar(nearest->frame).inverse() * T_map_lidar, 0.0};
+  std::vector<PosePrediction> predictions;
+  for (const auto& [distance_m2, place] : nearest)
+    predictions.push_back({place->frame, map_.T_map_lidar(place->frame).inverse() * T_map_lidar, 0.0});
+  return predictions;
+}
+
+// What is nearer shows more of the same: a pose that no place tried so far makes certain may be certain from one
+// beside.
+Status Localiser::look_nearby(const PreparedScan& scan, Detection& detection) {
+  if (detection.loop || highest_log_odds(detection) < Nearby::kWorthwhile_log_odds) return ok();
+  const auto best =
+      std::max_element(detection.registered.begin(), detection.registered.end(),
+                       [](const auto& a, const auto& b) { return a.evidence.own_log_odds < b.evidence.own_log_odds; });
+  const Pose T_map_lidar = map_.T_map_lidar(best->match) * best->evidence.T_match_query;
+  for (const PosePrediction& each : nearest_places(T_map_lidar, map_.part(best->match), Nearby::kPlaces)) {
+    const bool is_tried = std::any_of(detection.registered.begin(), detection.registered.end(),
+                                      [&](const auto& other) { return other.match == each.match; });
+    if (is_tried || detection.loop) continue;
+    const auto tested = recognition_.test(scan, each, typical_);
+    if (!tested) return tested.error();
+    if (!tested->geometric) continue;
+    const GeometricEvidence& found = *tested->geometric;
+    detection.registered.push_back({each.match, found});
+    if (!tested->is_accepted() ||
+        (each.T_match_query.inverse() * found.T_match_query).translation().norm() > Nearby::kSame_m)
+      continue;
+    detection.loop =
+        LoopConstraint{detection.frame,       each.match,        found.T_match_query, found.evidence.inlier_ratio,
+                       found.evidence.rmse_m, found.probability, tested->score(),     found.information};
+    detection.refusal.reset();
+  }
+  return ok();
 }
 
 Result<Localisation> Localiser::stay(const PreparedScan& scan, const TrajectoryPoint& point) {
@@ -233,8 +274,9 @@ Result<Localisation> Localiser::stay(const PreparedScan& scan, const TrajectoryP
   Localisation result;
   result.frame = scan.scan.frame;
   const Pose T_predicted = state.T_map_segment * point.T_segment_lidar;
-  const auto prediction = nearest_place(T_predicted);
-  if (prediction) {
+  const auto nearest = nearest_places(T_predicted, state.part, 1);
+  const PosePrediction* const prediction = nearest.empty() ? nullptr : &nearest.front();
+  if (prediction != nullptr) {
     const auto tested = recognition_.test(scan, *prediction, typical_);
     if (!tested) return tested.error();
     if (tested->geometric) {
@@ -262,8 +304,8 @@ Result<Localisation> Localiser::stay(const PreparedScan& scan, const TrajectoryP
     }
   }
   if (result.reason.empty())
-    result.reason = prediction ? "does not fit the map where it is predicted"
-                               : format("no place of the map is within %.0f m", Staying::kFar_m);
+    result.reason = prediction != nullptr ? "does not fit the map where it is predicted"
+                                          : format("no place of the map is within %.0f m", Staying::kFar_m);
   if (travelled_m > Staying::kLost_m || scan.scan.stamp_s - state.stamp_s > Staying::kLost_s) {
     following_.reset();
     return result;

@@ -59,7 +59,9 @@ class Localiser {
   Result<Localisation> wake_up(const PreparedScan& scan, const TrajectoryPoint& point);
   Result<Localisation> stay(const PreparedScan& scan, const TrajectoryPoint& point);
   Result<std::optional<Twist>> motion_of(const PreparedScan& scan, const Detection& detection) const;
-  std::optional<PosePrediction> nearest_place(const Pose& T_map_lidar) const;
+  /// The places nearest to a pose in a part of the map, the nearest first, with the pose relative to each.
+  std::vector<PosePrediction> nearest_places(const Pose& T_map_lidar, int part, std::size_t count) const;
+  Status look_nearby(const PreparedScan& scan, Detection& detection);
   Localisation found(FrameId frame, const LoopConstraint& loop) const;
 
   struct Place {
