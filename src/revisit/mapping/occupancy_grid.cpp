@@ -5,7 +5,8 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
-#include <set>
+#include <map>
+#include <optional>
 #include <vector>
 
 namespace revisit {
@@ -56,7 +57,7 @@ void OccupancyGrid::add(const Pose& T_map_lidar, std::span<const Point> points,
                         std::span<const Eigen::Vector3f> ground) {
   const GroundAround around(T_map_lidar, ground, options_.range_m);
   const Key sensor = key(T_map_lidar.translation());
-  std::set<Key> obstacles, ends;
+  std::vector<Key> obstacles, ends;
   for (const Point& each : points) {
     const Eigen::Vector3d in_lidar = Eigen::Vector3f(each.x, each.y, each.z).cast<double>();
     if (in_lidar.norm() > options_.range_m) continue;
@@ -65,8 +66,12 @@ void OccupancyGrid::add(const Pose& T_map_lidar, std::span<const Point> points,
     if (!ground_m) continue;
     const double above_m = p.z() - *ground_m;
     if (above_m >= options_.height_m) continue;
-    ends.insert(key(p));
-    if (above_m > options_.clearance_m) obstacles.insert(key(p));
+    ends.push_back(key(p));
+    if (above_m > options_.clearance_m) obstacles.push_back(key(p));
+  }
+  for (std::vector<Key>* each : {&obstacles, &ends}) {
+    std::sort(each->begin(), each->end());
+    each->erase(std::unique(each->begin(), each->end()), each->end());
   }
   for (const Key& obstacle : obstacles) ++cells_[obstacle].obstacle;
   // Over what lies lower than the clearance it was seen, up to what stands in the way.
@@ -75,10 +80,10 @@ void OccupancyGrid::add(const Pose& T_map_lidar, std::span<const Point> points,
 
 // Bresenham's line; the last cell is left out.
 void OccupancyGrid::see_over(const Key& from, const Key& to) {
-  auto [x, y] = from;
-  const int dx = std::abs(to.first - x), dy = -std::abs(to.second - y);
-  const int step_x = x < to.first ? 1 : -1, step_y = y < to.second ? 1 : -1;
-  for (int error = dx + dy; x != to.first || y != to.second;) {
+  std::int32_t x = from.x, y = from.y;
+  const int dx = std::abs(to.x - x), dy = -std::abs(to.y - y);
+  const int step_x = x < to.x ? 1 : -1, step_y = y < to.y ? 1 : -1;
+  for (int error = dx + dy; x != to.x || y != to.y;) {
     ++cells_[{x, y}].through;
     const int twice = 2 * error;
     if (twice >= dy) {
@@ -109,10 +114,10 @@ Status OccupancyGrid::write(const std::filesystem::path& yaml_file) const {
   if (cells_.empty()) return Error{yaml_file.string() + ": the map shows no ground to drive on"};
   int low_x = std::numeric_limits<int>::max(), low_y = low_x, high_x = std::numeric_limits<int>::min(), high_y = high_x;
   for (const auto& [cell, seen] : cells_) {
-    low_x = std::min(low_x, cell.first);
-    high_x = std::max(high_x, cell.first);
-    low_y = std::min(low_y, cell.second);
-    high_y = std::max(high_y, cell.second);
+    low_x = std::min(low_x, cell.x);
+    high_x = std::max(high_x, cell.x);
+    low_y = std::min(low_y, cell.y);
+    high_y = std::max(high_y, cell.y);
   }
   const auto width = static_cast<std::size_t>(high_x - low_x + 1),
              height = static_cast<std::size_t>(high_y - low_y + 1);
@@ -120,7 +125,7 @@ Status OccupancyGrid::write(const std::filesystem::path& yaml_file) const {
   std::vector<char> image(width * height, kUnknown);  // rows from the top, where y is largest
   for (const auto& [cell, seen] : cells_) {
     const Cell is = verdict(seen);
-    image[static_cast<std::size_t>(high_y - cell.second) * width + static_cast<std::size_t>(cell.first - low_x)] =
+    image[static_cast<std::size_t>(high_y - cell.y) * width + static_cast<std::size_t>(cell.x - low_x)] =
         is == Cell::kOccupied ? kOccupied
         : is == Cell::kFree   ? kFree
                               : kUnknown;

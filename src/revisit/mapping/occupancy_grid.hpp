@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <compare>
+#include <cstdint>
 #include <filesystem>
-#include <map>
 #include <span>
-#include <utility>
+#include <unordered_map>
 
 #include <Eigen/Core>
 
@@ -37,7 +38,16 @@ class OccupancyGrid {
   Status write(const std::filesystem::path& yaml_file) const;
 
  private:
-  using Key = std::pair<int, int>;  ///< of a cell: x, y
+  struct Key {  ///< of a cell
+    std::int32_t x = 0, y = 0;
+    auto operator<=>(const Key&) const = default;
+  };
+  struct Hash {
+    std::size_t operator()(const Key& key) const {
+      return (static_cast<std::size_t>(static_cast<std::uint32_t>(key.x)) * 0x9E3779B97F4A7C15u) ^
+             (static_cast<std::size_t>(static_cast<std::uint32_t>(key.y)) * 0xC2B2AE3D27D4EB4Fu);
+    }
+  };
   struct Seen {
     std::uint32_t through = 0, obstacle = 0;
   };
@@ -46,7 +56,7 @@ class OccupancyGrid {
   static Cell verdict(const Seen& seen);
 
   Options options_;
-  std::map<Key, Seen> cells_;
+  std::unordered_map<Key, Seen, Hash> cells_;
 };
 
 }  // namespace revisit
