@@ -106,7 +106,8 @@ Result<JudgedTrajectory> judge(const fs::path& file, const Trajectory& reference
     if (!store) return store.error();
     const auto scans = store->scans();
     if (!scans) return scans.error();
-    for (const StoredScan& scan : *scans) stamps.push_back({scan.frame, scan.stamp_s});
+    for (const StoredScan& scan : *scans)
+      if (session_of(scan.frame) == 0) stamps.push_back({scan.frame, scan.stamp_s});
   } else {
     for (const auto& [frame, entry] : reference.entries) stamps.push_back({frame, entry.stamp_s});
   }

@@ -54,22 +54,36 @@ Status export_points(const SavedMap& map, const Part& part, const ExportOptions&
   if (options.as == "ply") how.formats = {CloudFormat::kPly};
   if (options.as == "pcd") how.formats = {CloudFormat::kPcd};
   if (options.as == "las") how.formats = {CloudFormat::kLas};
+  // Beside what is in the folder already, which stays.
+  const fs::path out = options.out, scratch = out / ".export.part";
+  std::error_code failure;
+  if (options.as == "tiles" && fs::exists(out / "tiles", failure) && !fs::exists(out / "tiles" / "tiles.json", failure))
+    return Error{(out / "tiles").string() + ": is there already and holds no tiles.json; name another folder"};
+  fs::create_directories(scratch, failure);
+  if (failure) return Error{scratch.string() + ": cannot be created: " + failure.message()};
   Progress progress("export", "key frames", part.frames.size());
-  const auto report = build_map(input, how, options.out, [&](std::size_t done) {
+  const auto report = build_map(input, how, scratch, [&](std::size_t done) {
     progress.update(done);
     return !interrupted();
   });
-  if (!report) return report.error();
-  if (interrupted()) return Error{"interrupted; nothing was written"};
-  std::error_code failure;
-  if (options.as != "tiles") fs::remove_all(fs::path(options.out) / "tiles", failure);
-  return ok();
+  Status status = report ? ok() : Status(report.error());
+  if (status && interrupted()) status = Error{"interrupted; nothing was written"};
+  if (status) {
+    const std::string name = options.as == "tiles" ? "tiles" : "map." + options.as;
+    if (options.as == "tiles") fs::remove_all(out / name, failure);
+    fs::rename(scratch / name, out / name, failure);
+    if (failure) status = Error{(out / name).string() + ": cannot be written: " + failure.message()};
+  }
+  std::error_code ignored;
+  fs::remove_all(scratch, ignored);
+  return status;
 }
 
 Status export_grid(const SavedMap& map, const Part& part, const ExportOptions& options) {
   OccupancyGrid grid(options.grid);
   Progress progress("export", "key frames", part.frames.size());
   for (std::size_t i = 0; i < part.frames.size(); ++i) {
+    if (interrupted()) return Error{"interrupted; nothing was written"};
     const auto points = read_map_points(*map.store(), part.frames[i]);
     if (!points) return points.error();
     const auto bytes = map.store()->part(part.frames[i], MapStore::Part::kPlace);

@@ -39,9 +39,11 @@ int merge(const MergeOptions& options) {
   Table table = {{"session", "recording", "key frames", "loops to other sessions", "part of the map"}};
   std::set<int> parts;
   for (const MergeReport::Session& each : report->sessions) {
-    parts.insert(each.part);
+    parts.insert(each.parts.begin(), each.parts.end());
+    std::string of_session;
+    for (const int part : each.parts) of_session += (of_session.empty() ? "" : ", ") + std::to_string(part);
     table.push_back({std::to_string(each.id), each.recording, std::to_string(each.keyframes),
-                     std::to_string(each.loops), std::to_string(each.part)});
+                     std::to_string(each.loops), of_session});
   }
   std::cout << to_text(table) << "Map: " << options.out << '\n';
   if (parts.size() > 1)

@@ -263,18 +263,23 @@ int slam(const SlamOptions& options) {
   run.counts["skipped"] = run.skipped.size();
   // What was found until here is written, whatever happened.
   const Status rows = write_rows(**store, slam->session(), *writer);
-  const Status poses = slam->graph().keyframes().empty() ? ok() : write_trajectories(*slam, **recording, out);
-  const Status map = slam->graph().keyframes().empty() || options.without_map ? ok() : write_map(*slam, out, run);
+  const Status poses = !slam->has_keyframes() ? ok() : write_trajectories(*slam, **recording, out);
+  const Status map = !slam->has_keyframes() || options.without_map ? ok() : write_map(*slam, out, run);
   const Status described = write_run(out / "run.json", run);
   for (const Status* each : {&std::as_const(status), &rows, &poses, &map, &described})
     if (!*each) return fail(each->error());
 
-  if (slam->graph().keyframes().empty()) return fail({options.input + ": no scan can be used"});
+  if (!slam->has_keyframes()) return fail({options.input + ": no scan can be used"});
   std::cout << run.counts["scans"] << " scans, " << slam->graph().keyframes().size() << " key frames, "
             << run.counts["loops"] << " loops in the graph, " << run.counts["untracked"] << " scans not tracked, "
             << run.skipped.size() << " skipped\nTrajectory: " << (out / "poses.tum").string();
   if (!options.without_map) std::cout << "\nMap: " << (out / "map.ply").string() << ", " << (out / "map.png").string();
   std::cout << '\n';
+  if (slam->session() > 0 && !slam->is_joined())
+    print_log()(
+        LogLevel::kWarning,
+        "this session was not found in the map: it waits beside it, with coordinates of its own, until a session "
+        "that passes through both joins them");
   if (!run.untracked.empty())
     print_log()(LogLevel::kWarning, "not tracked: frames " + to_ranges(run.untracked) +
                                         "; their poses are predicted (exit code 3; all of them in run.json)");

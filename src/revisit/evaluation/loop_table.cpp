@@ -5,16 +5,12 @@
 #include <cmath>
 #include <set>
 
+#include <revisit/evaluation/internal/percentile.hpp>
+
 namespace revisit {
 namespace {
 
-// The smallest value that at least `share` of all do not exceed; 0 of none.
-double percentile(std::vector<double> values, double share) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  const double rank = std::ceil(share * static_cast<double>(values.size()));
-  return values[static_cast<std::size_t>(std::max(1.0, rank)) - 1];
-}
+using evaluation_internal::percentile;
 
 double share(std::size_t part, std::size_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);

@@ -5,17 +5,14 @@
 #include <cmath>
 #include <limits>
 
+#include <revisit/evaluation/internal/percentile.hpp>
+
 namespace revisit {
 namespace {
 
-constexpr double kOutside_m = 25.0;
+using evaluation_internal::percentile;
 
-double percentile(std::vector<double> values, double share) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  const double rank = std::ceil(share * static_cast<double>(values.size()));
-  return values[static_cast<std::size_t>(std::max(1.0, rank)) - 1];
-}
+constexpr double kOutside_m = 25.0;
 
 }  // namespace
 

@@ -119,8 +119,12 @@ Status OccupancyGrid::write(const std::filesystem::path& yaml_file) const {
     low_y = std::min(low_y, cell.y);
     high_y = std::max(high_y, cell.y);
   }
-  const auto width = static_cast<std::size_t>(high_x - low_x + 1),
-             height = static_cast<std::size_t>(high_y - low_y + 1);
+  const auto width = static_cast<std::size_t>(std::int64_t{high_x} - low_x + 1),
+             height = static_cast<std::size_t>(std::int64_t{high_y} - low_y + 1);
+  constexpr std::size_t kMostCells = 2'000'000'000;
+  if (width > kMostCells / height)
+    return Error{yaml_file.string() + ": " + std::to_string(width) + " x " + std::to_string(height) +
+                 " cells; allowed: up to " + std::to_string(kMostCells) + " (larger cells need fewer)"};
   constexpr char kFree = '\xfe', kOccupied = '\0', kUnknown = '\xcd';
   std::vector<char> image(width * height, kUnknown);  // rows from the top, where y is largest
   for (const auto& [cell, seen] : cells_) {

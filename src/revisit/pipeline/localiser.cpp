@@ -96,6 +96,10 @@ Result<Localiser> Localiser::open(const std::filesystem::path& path, const Param
     return Error{path.string() + ": " + status.error().message};
   // What the last session knows: of several sensors, the one that was used last.
   for (const StoredSession& session : opened.stored().sessions) {
+    const auto& keyframes = opened.stored().keyframes;
+    if (std::none_of(keyframes.begin(), keyframes.end(),
+                     [&](const auto& each) { return session_of(each.frame.frame) == session.id; }))
+      continue;
     const auto sensor = to_sensor_facts(session.sensor);
     if (!sensor) return Error{path.string() + ": " + sensor.error().message};
     if (!*sensor) continue;
@@ -168,6 +172,7 @@ Result<std::optional<Twist>> Localiser::motion_of(const PreparedScan& scan, cons
 Result<Localisation> Localiser::follow(Scan scan, const std::optional<Pose>& T_external_lidar) {
   filter_range(scan, parameters_.preprocess);
   const FrameId frame = scan.frame;
+  if (scan.points.empty()) return Error{to_text(frame) + ": no point within the range filter"};
   const OdometryStep step = odometry_.follow(scan, T_external_lidar);
   scan.stamp_s = step.stamp_s;
   if (step.up) scan.up = step.up;

@@ -135,9 +135,9 @@ TEST(MergeMaps, JoinsWhatBelongsTogetherAndNothingElse) {
   ASSERT_TRUE(report) << report.error().message;
   EXPECT_EQ(last_done, all);
   ASSERT_EQ(report->sessions.size(), 3u);
-  EXPECT_EQ(report->sessions[0].part, 0);
-  EXPECT_NE(report->sessions[1].part, 0);
-  EXPECT_EQ(report->sessions[2].part, 0);
+  EXPECT_EQ(report->sessions[0].parts, std::set{0});
+  EXPECT_FALSE(report->sessions[1].parts.contains(0));
+  EXPECT_EQ(report->sessions[2].parts, std::set{0});
   EXPECT_GE(report->sessions[2].loops, 6u);
   EXPECT_EQ(report->sessions[1].loops, 0u);
   const auto map = SavedMap::open(out);
@@ -147,6 +147,26 @@ TEST(MergeMaps, JoinsWhatBelongsTogetherAndNothingElse) {
   EXPECT_EQ(map->store()->scans()->size(), 3u * kSessionScans);
 
   EXPECT_FALSE(merge_maps(maps, out)) << "exists already";
+}
+
+// Joined by what both saw, the rest of the second map comes along: what it saw alone, and its own further session.
+TEST(MergeMaps, WhatLeavesTheOverlapComesAlong) {
+  const fs::path folder = fresh_folder(), out = folder / "all.revisit";
+  const PoseOf leaving = [](int i) { return SyntheticWorld::at(10.0 - kSessionStep_m * i, 0.8, kPi); };
+  const PoseOf beyond = [](int i) { return SyntheticWorld::at(-8.0 - 0.5 * i, 0.4, kPi); };
+  (void)drive(folder / "a", there, 61);
+  (void)drive(folder / "b", leaving, 61);
+  const auto second = drive(folder / "b", beyond, 61, true);
+  ASSERT_TRUE(second && second->is_joined());
+  const std::vector<fs::path> maps{folder / "a", folder / "b"};
+  const auto report = merge_maps(maps, out);
+  ASSERT_TRUE(report) << report.error().message;
+  ASSERT_EQ(report->sessions.size(), 3u);
+  const auto map = SavedMap::open(out);
+  ASSERT_TRUE(map) << map.error().message;
+  for (const auto& each : report->sessions) EXPECT_EQ(each.parts, std::set{0}) << each.recording;
+  EXPECT_LT(off_m(*map, 0, there, 1, leaving), 0.3);
+  EXPECT_LT(off_m(*map, 0, there, 2, beyond), 0.3);
 }
 
 // The new file is there whole or not at all; the old ones stay as they are.

@@ -28,6 +28,8 @@ Result<Source> open_source(const fs::path& path) {
   if (!fs::exists(file, failure)) return Error{file.string() + ": no such map; `revisit slam` makes one"};
   auto store = MapStore::open(file, MapStore::Access::kRead);
   if (!store) return store.error();
+  // As it is now, until its scans have been read, too.
+  if (const Status held = store->hold(); !held) return held.error();
   auto map = read_map(*store);
   if (!map) return Error{file.string() + ": " + map.error().message};
   if (map->keyframes.empty()) return Error{file.string() + ": the map holds no key frame yet"};
@@ -57,7 +59,13 @@ class Merger {
   std::function<bool()> advance_;
   SlamBackEnd back_end_;
   MergeReport report_;
-  int first_session_ = 0, first_segment_ = 0;  ///< of the map at work
+  // Of the map at work.
+  int first_session_ = 0, first_segment_ = 0;
+  struct Anchor {
+    FrameId frame;  ///< in the new map
+    Pose T_map_lidar = Pose::Identity();
+  };
+  std::map<int, Anchor> anchors_;  ///< the last key frame of each of its parts
 };
 
 Result<SlamBackEnd::Entry> Merger::entry(const Source& source, const StoredMap::Keyframe& keyframe) const {
@@ -75,7 +83,14 @@ Result<SlamBackEnd::Entry> Merger::entry(const Source& source, const StoredMap::
     entry.row.starts_segment = back_end_.graph().last_point().segment != entry.point.segment;
     if (!entry.edge) entry.edge = KeyframeGraph::OdometryEdge{Pose::Identity(), no_information()};
   }
-  if (keyframe.settled) entry.T_world_lidar = keyframe.settled->T_map_lidar;
+  if (keyframe.settled) {
+    // As its map has it to the last one of the same part, wherever that one has been moved to by now.
+    const auto anchor = anchors_.find(keyframe.settled->part);
+    entry.T_world_lidar = keyframe.settled->T_map_lidar;
+    if (anchor != anchors_.end())
+      entry.T_world_lidar = normalised(back_end_.graph().T_world_lidar(anchor->second.frame) *
+                                       anchor->second.T_map_lidar.inverse() * keyframe.settled->T_map_lidar);
+  }
   for (const auto& [part, bytes] : {std::pair{MapStore::Part::kDescriptor, &entry.row.descriptor},
                                     {MapStore::Part::kPlace, &entry.row.place},
                                     {MapStore::Part::kCloud, &entry.row.cloud}}) {
@@ -101,6 +116,7 @@ Status Merger::add(const Source& source) {
   const auto& before = back_end_.graph().keyframes();
   first_segment_ = before.empty() ? 0 : back_end_.graph().last_point().segment + 1;
   first_session_ = static_cast<int>(report_.sessions.size());
+  anchors_.clear();
   const std::size_t places = back_end_.places();  // those of the same map have been searched already
   std::multimap<FrameId, const LoopConstraint*> loops;
   for (const LoopConstraint& loop : source.map.loops) loops.emplace(std::max(loop.query, loop.match), &loop);
@@ -109,7 +125,7 @@ Status Merger::add(const Source& source) {
     const int id = session.id + first_session_;
     if (id != static_cast<int>(report_.sessions.size()))
       return Error{source.file.string() + ": its sessions are not numbered one after the other"};
-    report_.sessions.push_back({id, session.recording});
+    report_.sessions.push_back({id, session.recording, 0, {}, 0});
     if (Status begun = back_end_.begin_session({id, session.recording, session.parameters, session.sensor}); !begun)
       return begun;
     for (; keyframe != source.map.keyframes.end() && session_of(keyframe->frame.frame) == session.id; ++keyframe) {
@@ -117,6 +133,8 @@ Status Merger::add(const Source& source) {
       if (!entered) return entered.error();
       if (const auto added = back_end_.add_entry(*std::move(entered), places); !added) return added.error();
       ++report_.sessions.back().keyframes;
+      if (const auto& settled = keyframe->settled)
+        anchors_[settled->part] = {renumbered(settled->keyframe), settled->T_map_lidar};
       const auto [first, last] = loops.equal_range(keyframe->frame.frame);
       for (auto it = first; it != last; ++it) {
         LoopConstraint loop = *it->second;
@@ -134,6 +152,7 @@ Status Merger::add_scans(const Source& source) {
   const auto scans = source.store.scans();
   if (!scans) return scans.error();
   for (StoredScan scan : *scans) {
+    if (!back_end_.graph().has(renumbered(scan.keyframe))) continue;
     scan.frame = renumbered(scan.frame);
     scan.keyframe = renumbered(scan.keyframe);
     if (Status added = store_->add(scan); !added) return added;
@@ -145,7 +164,7 @@ Result<MergeReport> Merger::finish() {
   if (const Status finished = back_end_.finish(); !finished) return finished.error();
   const KeyframeGraph& graph = back_end_.graph();
   for (const FrameId frame : graph.keyframes())
-    report_.sessions.at(static_cast<std::size_t>(session_of(frame))).part = graph.part(frame);
+    report_.sessions.at(static_cast<std::size_t>(session_of(frame))).parts.insert(graph.part(frame));
   const auto edges = store_->edges();
   if (!edges) return edges.error();
   for (const StoredEdge& edge : *edges) {
@@ -180,14 +199,16 @@ Result<MergeReport> merge_maps(std::span<const fs::path> maps, const fs::path& o
   auto store = MapStore::create(partial);
   if (!store) return store.error();
   Result<MergeReport> report = Error{};
+  const auto written = std::make_shared<MapStore>(*std::move(store));
   {
-    Merger merger(std::make_shared<MapStore>(*std::move(store)), parameters, log,
-                  [&] { return !progress || progress(++done, keyframes); });
+    Merger merger(written, parameters, log, [&] { return !progress || progress(++done, keyframes); });
     Status status = ok();
     for (const Source& source : sources)
       if (status) status = merger.add(source);
     report = status ? merger.finish() : Result<MergeReport>(status.error());
   }
+  if (report)
+    if (const Status closed = written->close(); !closed) report = closed.error();
   if (report) fs::rename(partial, out, failure);
   if (report && failure) report = Error{out.string() + ": cannot be written: " + failure.message()};
   if (!report) remove_partial();

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -19,8 +20,9 @@ struct MergeReport {
     int id = 0;             ///< in the new map
     std::string recording;  ///< as its map named it
     std::size_t keyframes = 0;
-    int part = 0;           ///< of the map: sessions of one part are joined, between parts nothing was found in common
-    std::size_t loops = 0;  ///< between it and sessions of the other maps
+    /// Of the map, mostly one: sessions of one part are joined, between parts nothing was found in common.
+    std::set<int> parts;
+    std::size_t loops = 0;  ///< between it and other sessions
   };
   std::vector<Session> sessions;
 };

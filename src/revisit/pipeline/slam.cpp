@@ -67,7 +67,11 @@ Status Slam::restore(const SlamSetup& setup) {
   return front_end_.restore(*store_, *map);
 }
 
-bool Slam::is_joined() const { return !graph().keyframes().empty() && graph().part(graph().keyframes().back()) == 0; }
+bool Slam::has_keyframes() const {
+  return !graph().keyframes().empty() && session_of(graph().keyframes().back()) == session_;
+}
+
+bool Slam::is_joined() const { return has_keyframes() && graph().part(graph().keyframes().back()) == 0; }
 
 Result<SlamStep> Slam::process(Scan scan, const std::optional<Pose>& T_external_lidar) {
   if (!failure_) return failure_.error();
@@ -118,7 +122,7 @@ Result<SlamStep> Slam::process(Scan scan, const std::optional<Pose>& T_external_
 
 Status Slam::finish() {
   if (!failure_) return failure_;
-  return graph().keyframes().empty() ? ok() : back_end_.finish();
+  return has_keyframes() ? back_end_.finish() : store_->roll_back();  // an empty session is none
 }
 
 Result<Slam::Trajectories> Slam::trajectories() const {
@@ -135,8 +139,17 @@ Result<Slam::Trajectories> Slam::trajectories() const {
   return result;
 }
 
+// Other sessions that are not joined with this one have other coordinates.
 MapInput Slam::map_input() const {
-  return {graph().graph().nodes(), [this](std::size_t i) { return read_map_points(*store_, graph().keyframes()[i]); }};
+  std::vector<FrameId> frames;
+  std::vector<Pose> poses;
+  for (const FrameId frame : graph().keyframes()) {
+    if (session_of(frame) != session_ && graph().part(frame) != graph().part(graph().keyframes().back())) continue;
+    frames.push_back(frame);
+    poses.push_back(graph().T_world_lidar(frame));
+  }
+  return {std::move(poses),
+          [this, frames = std::move(frames)](std::size_t i) { return read_map_points(*store_, frames[i]); }};
 }
 
 Result<std::vector<Point>> Slam::map() const {

@@ -66,6 +66,8 @@ class Slam {
   std::optional<FrameId> last_frame() const { return last_frame_; }
   /// Number of this session in the map. Key frames of graph() and store() carry it (in_map()).
   int session() const { return session_; }
+  /// Whether this session has any.
+  bool has_keyframes() const;
   /// Whether loops join this session with the first one, or whether it waits beside it.
   bool is_joined() const;
   const KeyframeGraph& graph() const { return back_end_.graph(); }

@@ -51,11 +51,10 @@ bool KeyframeGraph::add_loop(const LoopConstraint& loop) {
   return attaches;
 }
 
-void KeyframeGraph::restore_loop(const LoopConstraint& loop, bool is_settled) {
-  if (is_settled) gate_.join(loop);  // nothing is to be moved
+void KeyframeGraph::restore_loop(const LoopConstraint& loop, bool is_placed) {
+  if (is_placed) gate_.join(loop);  // nothing is to be moved
   add_loop(loop);
   gate_.restore(loop);
-  if (is_settled) --loops_unsettled_;
 }
 
 Status KeyframeGraph::settle_if_due() {

@@ -33,8 +33,10 @@ class KeyframeGraph {
   /// Adds a loop that the gate let in. True where it attaches the newest segment to the map. Of two parts that it
   /// joins, the later one moves to where the loop has it.
   bool add_loop(const LoopConstraint& loop);
-  /// A loop that entered in an earlier run; `is_settled`: the key frames are where it has them.
-  void restore_loop(const LoopConstraint& loop, bool is_settled);
+  /// A loop that entered in an earlier run; `is_placed`: the key frames are where it has them.
+  void restore_loop(const LoopConstraint& loop, bool is_placed);
+  /// All key frames are where the loops have them.
+  void set_settled() { loops_unsettled_ = keyframes_unsettled_ = 0; }
 
   /// Moves the key frames to where all edges agree best: at the latest after 20 key frames with loops among them.
   Status settle_if_due();

@@ -75,9 +75,13 @@ bool LoopGate::may_join(const LoopConstraint& loop, const std::vector<const Loop
       queries_m = std::max(queries_m, travelled_between_m(at(a->query), at(b->query)).value_or(0.0));
       matches_m = std::max(matches_m, travelled_between_m(at(a->match), at(b->match)).value_or(0.0));
     }
-  const bool is_contradicted = std::any_of(waiting_.begin(), waiting_.end(), [&](const LoopConstraint& other) {
-    return compare(loop, other) == Verdict::kContradict;
-  });
+  const auto contradicts = [&](const LoopConstraint& one) {
+    return std::any_of(waiting_.begin(), waiting_.end(),
+                       [&](const LoopConstraint& other) { return compare(one, other) == Verdict::kContradict; });
+  };
+  const bool is_contradicted =
+      contradicts(loop) ||
+      std::any_of(agreeing.begin(), agreeing.end(), [&](const LoopConstraint* each) { return contradicts(*each); });
   return !is_contradicted && std::min(queries_m, matches_m) >= Consistency::kLengthToJoin_m;
 }
 

@@ -66,7 +66,7 @@ void checksum(sqlite3_context* context, int count, sqlite3_value** values) {
       const sqlite3_int64 number = sqlite3_value_int64(value);
       XXH3_64bits_update(&state, &number, sizeof number);
     } else if (type == SQLITE_FLOAT) {
-      const double number = sqlite3_value_double(value);
+      const double number = sqlite3_value_double(value) + 0.0;  // SQLite keeps no -0.0
       XXH3_64bits_update(&state, &number, sizeof number);
     } else if (type != SQLITE_NULL) {
       const void* const bytes = sqlite3_value_blob(value);

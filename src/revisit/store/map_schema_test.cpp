@@ -141,9 +141,14 @@ TEST(MapSchema, ManyReadWhileOneWrites) {
     ASSERT_TRUE(writer->commit());
     const auto one = MapStore::open(file, MapStore::Access::kRead), two = MapStore::open(file, MapStore::Access::kRead);
     ASSERT_TRUE(one && two) << (one ? two : one).error().message;
+    ASSERT_TRUE(one->hold());
     ASSERT_TRUE(writer->set(StoredSession{1, "c", "d", ""}));
     EXPECT_EQ(one->sessions()->size(), 1u) << "not committed yet";
     ASSERT_TRUE(writer->commit());
+    EXPECT_EQ(one->sessions()->size(), 1u) << "held";
+    ASSERT_TRUE(one->release());
+    EXPECT_EQ(one->sessions()->size(), 2u);
+    EXPECT_EQ(MapStore::open(file, MapStore::Access::kRead)->sessions()->size(), 2u);
     EXPECT_EQ(two->sessions()->size(), 2u);
   }
   {

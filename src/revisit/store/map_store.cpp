@@ -86,8 +86,12 @@ struct MapStore::Database {
     return ok();
   }
   // A map that nobody writes is one file, which may be copied, and read where nothing can be written.
-  ~Database() {
-    if (writes && handle && !is_in_transaction()) (void)run("PRAGMA journal_mode=DELETE");
+  ~Database() { (void)end_writing(); }
+  Status end_writing() {
+    if (!handle || !std::exchange(writes, false)) return ok();
+    if (is_in_transaction()) (void)run("ROLLBACK");
+    if (const Status status = run("PRAGMA wal_checkpoint(TRUNCATE)"); !status) return status;
+    return run("PRAGMA journal_mode=DELETE");
   }
   bool writes = false;
 
@@ -139,6 +143,7 @@ Result<MapStore> MapStore::open(const std::filesystem::path& file, Access access
     return MapStore(*std::move(database));
   }
   if (access == Access::kRead) {
+    database->reset();  // it would keep the upgraded file from becoming one
     if (const auto upgraded = open(file, Access::kWrite); !upgraded)
       return Error{file.string() + ": is a map of version " + std::to_string(*version) +
                    ", which cannot be upgraded: " + upgraded.error().message};
@@ -208,6 +213,18 @@ Status MapStore::add(const CandidateRow& answer) {
 }
 
 Status MapStore::commit() { return database_->is_in_transaction() ? database_->run("COMMIT") : ok(); }
+
+Status MapStore::hold() const { return database_->is_in_transaction() ? ok() : database_->run("BEGIN"); }
+
+Status MapStore::release() const { return is_held() ? database_->run("COMMIT") : ok(); }
+bool MapStore::is_held() const { return database_->is_in_transaction(); }
+
+Status MapStore::close() {
+  Status status = database_->end_writing();
+  std::error_code failure;
+  if (!status || !std::filesystem::exists(database_->file + "-wal", failure)) return status;
+  return Error{database_->file + ": cannot be written whole (a full disk, or another program reads it)"};
+}
 
 Status MapStore::roll_back() { return database_->is_in_transaction() ? database_->run("ROLLBACK") : ok(); }
 

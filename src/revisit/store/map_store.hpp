@@ -87,6 +87,9 @@ class MapStore {
   Status add(const CandidateRow& answer);
   /// Everything added since the last commit becomes part of the map, or none of it does.
   Status commit();
+  /// Nothing more will be written: what was committed is brought into the one file. Without it, the destructor does so
+  /// as far as it can.
+  Status close();
   /// Nothing added since the last commit becomes part of the map.
   Status roll_back();
 
@@ -98,6 +101,12 @@ class MapStore {
   /// A note beside the map. A second one of the same name replaces the first.
   Status set_note(const std::string& name, const std::string& text);
   Result<std::optional<std::string>> note(const std::string& name) const;
+
+  /// From here to release(), what is read is the map at one moment, whatever others write meanwhile. Not for long: it
+  /// keeps others from beginning to write.
+  Status hold() const;
+  Status release() const;
+  bool is_held() const;  ///< or there is something that waits for commit()
 
   /// In the order of their ids.
   Result<std::vector<StoredSession>> sessions() const;

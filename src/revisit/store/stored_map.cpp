@@ -49,7 +49,9 @@ Result<std::vector<StoredMap::Keyframe>> join(const MapStore& store, const std::
 
 }  // namespace
 
-Result<StoredMap> read_map(const MapStore& store) {
+namespace {
+
+Result<StoredMap> read_held_map(const MapStore& store) {
   auto sessions = store.sessions();
   if (!sessions) return sessions.error();
   const auto rows = store.keyframes();
@@ -61,6 +63,12 @@ Result<StoredMap> read_map(const MapStore& store) {
   auto keyframes = join(store, *rows, *edges);
   if (!keyframes) return keyframes.error();
   StoredMap map{*std::move(sessions), *std::move(keyframes), {}};
+  for (std::size_t i = 0; i < map.sessions.size(); ++i)
+    if (map.sessions[i].id != static_cast<int>(i))
+      return Error{"sessions of the map are not numbered 0, 1, ...: one has the number " +
+                   std::to_string(map.sessions[i].id)};
+  if (!map.keyframes.empty() && map.keyframes.front().frame.frame.value < 0)
+    return Error{"a key frame of the map has the number " + std::to_string(map.keyframes.front().frame.frame.value)};
   if (!map.keyframes.empty() &&
       (map.sessions.empty() || session_of(map.keyframes.back().frame.frame) > map.sessions.back().id))
     return Error{"key frames of the map belong to a session that it does not know"};
@@ -81,6 +89,16 @@ Result<StoredMap> read_map(const MapStore& store) {
   return map;
 }
 
+}  // namespace
+
+Result<StoredMap> read_map(const MapStore& store) {
+  if (store.is_held()) return read_held_map(store);
+  if (const Status held = store.hold(); !held) return held.error();
+  auto map = read_held_map(store);
+  if (const Status released = store.release(); !released && map) return released.error();
+  return map;
+}
+
 Status restore_graph(const StoredMap& map, KeyframeGraph& graph) {
   bool is_settled = true;
   for (const auto& each : map.keyframes) {
@@ -89,7 +107,9 @@ Status restore_graph(const StoredMap& map, KeyframeGraph& graph) {
     is_settled = is_settled && each.settled;
   }
   for (const LoopConstraint& loop : map.loops) graph.restore_loop(loop, is_settled);
-  return is_settled ? ok() : graph.settle();
+  if (!is_settled) return graph.settle();
+  graph.set_settled();
+  return ok();
 }
 
 TrajectoryPoint point_in_map(const Pose& T_map_lidar, int part) {
