@@ -31,8 +31,8 @@ int main(int argc, char** argv) {
 
   program_arguments().assign(argv + 1, argv + argc);
   std::vector<std::pair<CLI::App*, Run>> commands;
-  for (const auto add : {add_info, add_describe, add_detect, add_slam, add_localise, add_merge, add_export, add_evaluate, add_compare, add_calibrate,
-                         add_simulate, add_convert, add_parameters}) {
+  for (const auto add : {add_info, add_describe, add_detect, add_slam, add_localise, add_merge, add_export,
+                         add_evaluate, add_compare, add_calibrate, add_simulate, add_convert, add_parameters}) {
     Run run = add(program);
     commands.emplace_back(program.get_subcommands({}).back(), std::move(run));
   }

@@ -30,7 +30,6 @@ struct MapKeyframe {
   int part = 0;
 };
 /// Both by in_map(); key frames without a true pose are left out.
-SessionTable evaluate_sessions(const std::map<FrameId, MapKeyframe>& keyframes,
-                               const std::map<FrameId, Pose>& truth);
+SessionTable evaluate_sessions(const std::map<FrameId, MapKeyframe>& keyframes, const std::map<FrameId, Pose>& truth);
 
 }  // namespace revisit

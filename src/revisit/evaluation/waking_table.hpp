@@ -12,10 +12,10 @@ namespace revisit {
 /// Table 5: waking up in a saved map, and following in it (docs/evaluation.md).
 struct WakingTable {
   std::size_t scans = 0;
-  std::size_t in_map = 0;        ///< within 4 m of a key frame of the map
-  std::size_t right = 0;         ///< of these, answered within 0.5 m and 3 degrees
-  std::size_t outside = 0;       ///< farther than 25 m from all of them: places that the map does not hold
-  std::size_t answered = 0;      ///< of all scans
+  std::size_t in_map = 0;         ///< within 4 m of a key frame of the map
+  std::size_t right = 0;          ///< of these, answered within 0.5 m and 3 degrees
+  std::size_t outside = 0;        ///< farther than 25 m from all of them: places that the map does not hold
+  std::size_t answered = 0;       ///< of all scans
   std::size_t false_answers = 0;  ///< answers that are not right, wherever the scan is
   std::size_t false_outside = 0;  ///< of these, outside
   double median_error_m = 0.0, p95_error_m = 0.0, median_error_deg = 0.0;  ///< of right answers

@@ -24,9 +24,9 @@ void PoseBelief::add(const TrajectoryPoint& point, std::span<const Sighting> sig
     hypotheses_.clear();
     last_.reset();
   }
-  const double moved_m = last_ ? point.travelled_m - last_->travelled_m +
-                                     Adding::kMetresARadian * (point.turned_rad - last_->turned_rad)
-                               : Adding::kAnotherView_m;
+  const double moved_m =
+      last_ ? point.travelled_m - last_->travelled_m + Adding::kMetresARadian * (point.turned_rad - last_->turned_rad)
+            : Adding::kAnotherView_m;
   const double weight = std::clamp(moved_m / Adding::kAnotherView_m, 0.0, 1.0);
   last_ = point;
   std::vector<bool> is_seen(hypotheses_.size(), false);

@@ -82,8 +82,8 @@ TEST(Localiser, FollowsADriveAndFindsAKidnappedRobotAgain) {
     ASSERT_EQ(step->T_map_lidar.has_value(), step->status != Localisation::Status::kLost);
     if (step->status != Localisation::Status::kFollowed) continue;
     EXPECT_FALSE(step->information.isZero());
-    worst_m = std::max(
-        worst_m, ((pose_at(0).inverse() * T_world_query).inverse() * *step->T_map_lidar).translation().norm());
+    worst_m =
+        std::max(worst_m, ((pose_at(0).inverse() * T_world_query).inverse() * *step->T_map_lidar).translation().norm());
   }
   EXPECT_GE(found, 1);
   EXPECT_LE(lost, 8) << "found again in time";
