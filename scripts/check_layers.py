@@ -22,7 +22,7 @@ ALLOWED = {
     "pose_graph": {"core"},
     "store": CORE_CONFIG | {"preprocess", "descriptors", "registration", "odometry", "verification", "pose_graph"},
     "mapping": {"core"},
-    "localisation": {"core", "pose_graph", "store"},
+    "localisation": CORE_CONFIG | {"retrieval", "pose_graph", "store"},
     "pipeline": CORE_CONFIG | {"io", "preprocess", "descriptors", "retrieval", "registration", "odometry",
                                "verification", "pose_graph", "store", "mapping", "localisation"},
     "evaluation": {"core"},

@@ -10,6 +10,9 @@
 
 namespace revisit {
 
+/// The map that a path names, the file itself or the one in the folder, for reading.
+Result<MapStore> open_map(const std::filesystem::path& path);
+
 /// The map of earlier runs: its key frames at the poses that its loops give them. Belongs to one thread at a time.
 class SavedMap {
  public:

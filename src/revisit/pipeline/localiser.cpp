@@ -11,6 +11,7 @@
 #include <revisit/registration/sweep_motion.hpp>
 #include <revisit/store/sensor_facts.hpp>
 #include <revisit/store/stored_clouds.hpp>
+#include <revisit/store/stored_map.hpp>
 
 namespace revisit {
 namespace {
@@ -71,35 +72,25 @@ const char* to_string(Localisation::Status status) {
   return "";
 }
 
-Localiser::Localiser(SavedMap map, const Parameters& parameters, LogSink log,
+Localiser::Localiser(SavedPlaces map, const Parameters& parameters, LogSink log,
                      const std::optional<IntensityScale>& scale)
     : parameters_(parameters),
       map_(std::move(map)),
       odometry_(Odometry::Source::kLidar, ScanMatcher::kCoarse),
       preparation_(parameters, scale, {}, std::move(log)),
-      recognition_(parameters, clouds_in_store(map_.store())) {}
+      recognition_(parameters, clouds_in_store(map_.store()), map_.take_index()) {
+  for (const StoredMapPose& each : map_.poses())
+    recognition_.set_point(each.keyframe, point_in_map(each.T_map_lidar, each.part));
+}
 
 Result<Localiser> Localiser::open(const std::filesystem::path& path, const Parameters& parameters, LogSink log,
                                   const std::optional<IntensityScale>& scale) {
   if (const Status status = validate(parameters); !status) return status.error();
-  auto map = SavedMap::open(path);
+  auto map = SavedPlaces::open(path, parameters);
   if (!map) return map.error();
   Localiser localiser(*std::move(map), parameters, std::move(log), scale);
-  const SavedMap& opened = localiser.map_;
-  const auto add_place = [&](const StoredMap::Keyframe& place, const IntensityScanContext& descriptor) {
-    const FrameId frame = place.frame.frame;
-    const Pose& T_map_lidar = opened.T_map_lidar(frame);
-    localiser.recognition_.restore(place.frame, descriptor, point_in_map(T_map_lidar, opened.part(frame)));
-    localiser.places_.push_back({frame, T_map_lidar.translation(), opened.part(frame)});
-  };
-  if (const Status status = restore_places(*opened.store(), opened.stored(), parameters.descriptor, add_place); !status)
-    return Error{path.string() + ": " + status.error().message};
   // What the last session knows: of several sensors, the one that was used last.
-  for (const StoredSession& session : opened.stored().sessions) {
-    const auto& keyframes = opened.stored().keyframes;
-    if (std::none_of(keyframes.begin(), keyframes.end(),
-                     [&](const auto& each) { return session_of(each.frame.frame) == session.id; }))
-      continue;
+  for (const StoredSession& session : localiser.map_.sessions()) {
     const auto sensor = to_sensor_facts(session.sensor);
     if (!sensor) return Error{path.string() + ": " + sensor.error().message};
     if (!*sensor) continue;
@@ -230,9 +221,9 @@ Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const Trajecto
 }
 
 std::vector<PosePrediction> Localiser::nearest_places(const Pose& T_map_lidar, int part, std::size_t count) const {
-  std::vector<std::pair<double, const Place*>> nearest;
-  for (const Place& each : places_) {
-    const double distance_m2 = (each.position_m - T_map_lidar.translation()).squaredNorm();
+  std::vector<std::pair<double, const StoredMapPose*>> nearest;
+  for (const StoredMapPose& each : map_.poses()) {
+    const double distance_m2 = (each.T_map_lidar.translation() - T_map_lidar.translation()).squaredNorm();
     if (each.part != part || distance_m2 >= std::pow(Staying::kFar_m, 2)) continue;
     if (nearest.size() == count && distance_m2 >= nearest.back().first) continue;
     if (nearest.size() == count) nearest.pop_back();
@@ -240,8 +231,9 @@ std::vector<PosePrediction> Localiser::nearest_places(const Pose& T_map_lidar, i
                    {distance_m2, &each});
   }
   std::vector<PosePrediction> predictions;
+  predictions.reserve(nearest.size());
   for (const auto& [distance_m2, place] : nearest)
-    predictions.push_back({place->frame, map_.T_map_lidar(place->frame).inverse() * T_map_lidar, 0.0});
+    predictions.push_back({place->keyframe, place->T_map_lidar.inverse() * T_map_lidar, 0.0});
   return predictions;
 }
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include <revisit/localisation/pose_belief.hpp>
-#include <revisit/localisation/saved_map.hpp>
+#include <revisit/localisation/saved_places.hpp>
 #include <revisit/odometry/odometry.hpp>
 #include <revisit/pipeline/detection.hpp>
 #include <revisit/pipeline/place_recognition.hpp>
@@ -52,10 +52,10 @@ class Localiser {
   Result<Localisation> follow(Scan scan, const std::optional<Pose>& T_external_lidar = std::nullopt);
 
   std::size_t places() const { return recognition_.index().size(); }
-  const SavedMap& map() const { return map_; }
+  const SavedPlaces& map() const { return map_; }
 
  private:
-  Localiser(SavedMap map, const Parameters& parameters, LogSink log, const std::optional<IntensityScale>& scale);
+  Localiser(SavedPlaces map, const Parameters& parameters, LogSink log, const std::optional<IntensityScale>& scale);
   Result<Localisation> wake_up(const PreparedScan& scan, const TrajectoryPoint& point);
   Result<Localisation> stay(const PreparedScan& scan, const TrajectoryPoint& point);
   Result<std::optional<Twist>> motion_of(const PreparedScan& scan, const Detection& detection) const;
@@ -64,11 +64,6 @@ class Localiser {
   Status look_nearby(const PreparedScan& scan, Detection& detection);
   Localisation found(FrameId frame, const LoopConstraint& loop) const;
 
-  struct Place {
-    FrameId frame;
-    Eigen::Vector3d position_m;  ///< in the map
-    int part = 0;
-  };
   struct Following {
     Pose T_map_segment = Pose::Identity();  ///< of the odometry's segment
     TrajectoryPoint at;                     ///< where the map was seen last
@@ -80,12 +75,11 @@ class Localiser {
   };
 
   Parameters parameters_;
-  SavedMap map_;
+  SavedPlaces map_;
   Odometry odometry_;
   ScanPreparation preparation_;
   PlaceRecognition recognition_;
   TypicalAgreement typical_;
-  std::vector<Place> places_;
   PoseBelief belief_;
   std::optional<TrajectoryPoint> point_;
   std::optional<Following> following_;

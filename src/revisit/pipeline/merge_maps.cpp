@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <revisit/core/text.hpp>
+#include <revisit/localisation/saved_map.hpp>
 #include <revisit/pipeline/slam_back_end.hpp>
 #include <revisit/pose_graph/edge_information.hpp>
 #include <revisit/store/keyframe_bytes.hpp>
@@ -23,11 +24,9 @@ struct Source {
 };
 
 Result<Source> open_source(const fs::path& path) {
-  const fs::path file = MapStore::file_of(path);
-  std::error_code failure;
-  if (!fs::exists(file, failure)) return Error{file.string() + ": no such map; `revisit slam` makes one"};
-  auto store = MapStore::open(file, MapStore::Access::kRead);
+  auto store = open_map(path);
   if (!store) return store.error();
+  const fs::path file = store->file();
   // As it is now, until its scans have been read, too.
   if (const Status held = store->hold(); !held) return held.error();
   auto map = read_map(*store);
@@ -103,9 +102,8 @@ Result<SlamBackEnd::Entry> Merger::entry(const Source& source, const StoredMap::
   auto cloud = to_thin_cloud(entry.row.place);
   if (!descriptor) return source.store.damaged("descriptor", frame);
   if (!cloud) return source.store.damaged("place", frame);
-  const DescriptorOptions& grid = parameters_.descriptor;
-  if (descriptor->rings != grid.rings || descriptor->sectors != grid.sectors || descriptor->levels != grid.levels)
-    return Error{source.file.string() + ": describes places on another grid than the parameters"};
+  if (const Status same = check_grid(*descriptor, parameters_.descriptor); !same)
+    return Error{source.file.string() + ": " + same.error().message};
   entry.place.emplace();
   entry.place->descriptor = *std::move(descriptor);
   entry.place->cloud = *std::move(cloud);

@@ -23,7 +23,10 @@ namespace revisit {
 class PlaceRecognition {
  public:
   PlaceRecognition(const Parameters& parameters, std::unique_ptr<PlaceClouds> clouds)
-      : parameters_(parameters), index_(parameters.retrieval), clouds_(std::move(clouds)) {}
+      : PlaceRecognition(parameters, std::move(clouds), PlaceIndex(parameters.retrieval)) {}
+  /// `index`: of an earlier run, whose clouds are kept already; its places get their points by set_point().
+  PlaceRecognition(const Parameters& parameters, std::unique_ptr<PlaceClouds> clouds, PlaceIndex index)
+      : parameters_(parameters), index_(std::move(index)), clouds_(std::move(clouds)) {}
 
   /// Looks for the scan among the first `places` of the index. An error where a place cannot be read.
   Result<Detection> find(const PreparedScan& query, std::size_t places, const TypicalAgreement& typical);
@@ -41,9 +44,9 @@ class PlaceRecognition {
   void restore(const FrameTime& frame, const IntensityScanContext& descriptor,
                const std::optional<TrajectoryPoint>& point);
 
-  /// Where a place is, known better by now; frames that are no places are left out.
+  /// Where a place is, known better by now.
   void set_point(FrameId place, const TrajectoryPoint& point) {
-    if (const auto found = points_.find(place); found != points_.end()) found->second = point;
+    points_.insert_or_assign(points_.end(), place, point);
   }
 
   const PlaceIndex& index() const { return index_; }

@@ -192,8 +192,8 @@ Status SlamBackEnd::settle_session() {
   std::size_t entered = 0;
   if (Status stored = enter(graph_.decide_all(), entered); !stored) return stored;
   if (Status settled = graph_.settle(); !settled) return settled;
-  for (const FrameId frame : graph_.keyframes())
-    recognition_.set_point(frame, point_in_map(graph_.T_world_lidar(frame), graph_.part(frame)));
+  for (const StoredMapPose& each : poses_of_places())
+    recognition_.set_point(each.keyframe, point_in_map(each.T_map_lidar, each.part));
   return ok();
 }
 
@@ -214,7 +214,20 @@ Status SlamBackEnd::write_map_poses() {
   poses.reserve(graph_.keyframes().size());
   for (const FrameId frame : graph_.keyframes())
     poses.push_back({frame, graph_.T_world_lidar(frame), graph_.part(frame)});
-  return store_->set_map_poses(poses);
+  if (Status written = store_->set_map_poses(poses); !written) return written;
+  const auto index = recognition_.index().to_bytes();
+  return index ? store_->set_index(*index, poses_of_places()) : Status(index.error());
+}
+
+std::vector<StoredMapPose> SlamBackEnd::poses_of_places() const {
+  const PlaceIndex& index = recognition_.index();
+  std::vector<StoredMapPose> poses;
+  poses.reserve(index.size());
+  for (std::size_t i = 0; i < index.size(); ++i) {
+    const FrameId frame = index.frame(i);
+    poses.push_back({frame, graph_.T_world_lidar(frame), graph_.part(frame)});
+  }
+  return poses;
 }
 
 // For those who will look for scans in the map.

@@ -52,6 +52,7 @@ class SlamBackEnd {
   Result<Detection> find_loop(const PreparedScan& keyframe, const SensorFacts& sensor);
   KeyframeGraph::OdometryEdge edge_to(const TrajectoryPoint& point, const Matrix6& information) const;
   Status write_map_poses();
+  std::vector<StoredMapPose> poses_of_places() const;
   Status learn_look_alikes();
   Status settle_session();
   Status enter_keyframe(Entry entry, Result<Detection> detection, Added& added);

@@ -67,7 +67,12 @@ Error PlaceStore::damage(std::size_t i) const {
                " do not have the checksum they were saved with: the file was altered" + hint()};
 }
 
-Status PlaceStore::save(const std::string& path) const {
+std::size_t PlaceStore::saved_bytes() const {
+  const std::size_t chunks = chunks_of(size());
+  return first_chunk(chunks) + chunks * layout_.begin[ChunkLayout::kParts];
+}
+
+Status PlaceStore::save(const Write& write) const {
   const std::size_t places = size(), chunks = chunks_of(places);
   if (const Status intact = check(); !intact) return intact;
   // The checksums, filled up to a whole page.
@@ -81,38 +86,56 @@ Status PlaceStore::save(const std::string& path) const {
   header.levels = static_cast<std::uint32_t>(levels_);
   header.places = places;
   header.checksum = checksum_of(header, table.data(), chunks);
-
-  const std::string partial = path + ".part";
-  std::ofstream file(partial, std::ios::binary | std::ios::trunc);
-  const auto write = [&](const void* data, std::size_t bytes) {
-    file.write(static_cast<const char*>(data), static_cast<std::streamsize>(bytes));
-  };
   write(&header, sizeof header);
   write(table.data(), table.size() * sizeof(std::uint64_t));
   for (std::size_t i = 0; i < chunks; ++i) write(chunk(i * kChunk).data, layout_.begin[ChunkLayout::kParts]);
+  return ok();
+}
+
+Result<std::vector<std::byte>> PlaceStore::to_bytes() const {
+  std::vector<std::byte> result;
+  result.reserve(saved_bytes());
+  const Status saved = save([&](const void* data, std::size_t bytes) {
+    const auto* const first = static_cast<const std::byte*>(data);
+    result.insert(result.end(), first, first + bytes);
+  });
+  if (!saved) return saved.error();
+  return result;
+}
+
+Status PlaceStore::save(const std::string& path) const {
+  const std::string partial = path + ".part";
+  std::ofstream file(partial, std::ios::binary | std::ios::trunc);
+  const Status saved = save([&](const void* data, std::size_t bytes) {
+    file.write(static_cast<const char*>(data), static_cast<std::streamsize>(bytes));
+  });
   file.close();
   std::error_code failed;
-  if (file) std::filesystem::rename(partial, path, failed);
-  if (!file || failed) {
+  if (saved && file) std::filesystem::rename(partial, path, failed);
+  if (!saved || !file || failed) {
     std::error_code ignored;
     std::filesystem::remove(partial, ignored);
-    return Error{path + ": cannot be written (" + std::to_string(first_chunk(chunks) + chunks * layout_.begin[3]) +
-                 " bytes are needed)"};
+    if (!saved) return saved;
+    return Error{path + ": cannot be written (" + std::to_string(saved_bytes()) + " bytes are needed)"};
   }
   return ok();
 }
 
 Result<std::unique_ptr<PlaceStore>> PlaceStore::open(const std::string& path) {
-  auto mapped = MappedFile::open(path);
+  auto mapped = SavedBytes::map(path);
   if (!mapped) return mapped.error();
+  return open(path, *std::move(mapped));
+}
+
+Result<std::unique_ptr<PlaceStore>> PlaceStore::open(const std::string& path, SavedBytes bytes) {
   const auto refuse = [&](const std::string& why) { return Error{path + ": " + why}; };
 
   FileHeader header;
   const FileHeader ours;
-  const std::size_t size = mapped->size();
-  if (size < sizeof header || std::memcmp(mapped->data(), ours.magic, sizeof ours.magic) != 0)
+  const std::size_t size = bytes.size();
+  if (size < sizeof header || std::memcmp(bytes.data(), ours.magic, sizeof ours.magic) != 0)
     return refuse("is no place index of revisit (" + std::to_string(size) + " bytes)");
-  std::memcpy(&header, mapped->data(), sizeof header);
+  std::memcpy(&header, bytes.data(), sizeof header);
   if (header.byte_order != ours.byte_order) return refuse("was saved on a machine of other byte order" + hint());
   if (header.version != ours.version)
     return refuse("is of version " + std::to_string(header.version) + ", this program reads version " +
@@ -135,11 +158,11 @@ Result<std::unique_ptr<PlaceStore>> PlaceStore::open(const std::string& path) {
   if (size != expected)
     return refuse(std::to_string(size) + " bytes instead of the " + std::to_string(expected) + " that its " +
                   std::to_string(header.places) + " places take: it was cut off or written to" + hint());
-  const std::uint8_t* const table = mapped->data() + sizeof header;
+  const std::uint8_t* const table = bytes.data() + sizeof header;
   if (checksum_of(header, table, chunks) != header.checksum)
     return refuse("its header does not have the checksum it was saved with: the file was altered" + hint());
 
-  store->file_ = *std::move(mapped);
+  store->file_ = std::move(bytes);
   for (std::size_t i = 0; i < chunks; ++i) {
     const std::uint8_t* const data = store->file_.data() + first_chunk(chunks) + i * chunk_bytes;
     // A last chunk that is not full will be added to: it is copied.

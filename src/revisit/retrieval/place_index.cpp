@@ -126,4 +126,16 @@ Result<PlaceIndex> PlaceIndex::open(const std::string& path, const RetrievalOpti
   return PlaceIndex(options, *std::move(store));
 }
 
+Result<std::vector<std::byte>> PlaceIndex::to_bytes() const { return store_->to_bytes(); }
+
+Result<PlaceIndex> PlaceIndex::from_bytes(const std::string& name, std::size_t size,
+                                          const std::function<Status(std::span<std::byte>)>& read,
+                                          const RetrievalOptions& options) {
+  retrieval_internal::AlignedVector<std::uint8_t> bytes(size);
+  if (const Status status = read(std::as_writable_bytes(std::span(bytes))); !status) return status.error();
+  auto store = Store::open(name, retrieval_internal::SavedBytes(std::move(bytes)));
+  if (!store) return store.error();
+  return PlaceIndex(options, *std::move(store));
+}
+
 }  // namespace revisit

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -64,6 +67,12 @@ class PlaceIndex {
   /// Opens a saved index, to search and to go on adding. Refused are files that are no index, of another version, cut
   /// off or altered.
   static Result<PlaceIndex> open(const std::string& path, const RetrievalOptions& options);
+  /// The same bytes, to lie within another file.
+  Result<std::vector<std::byte>> to_bytes() const;
+  /// `read` fills the room for `size` of them; `name` is for errors.
+  static Result<PlaceIndex> from_bytes(const std::string& name, std::size_t size,
+                                       const std::function<Status(std::span<std::byte>)>& read,
+                                       const RetrievalOptions& options);
   /// Reads all that open() left to be checked on first use.
   Status check() const;
 

@@ -116,6 +116,13 @@ TrajectoryPoint point_in_map(const Pose& T_map_lidar, int part) {
   return {.segment = -1 - part, .T_segment_lidar = T_map_lidar, .origin = -1 - part};
 }
 
+Status check_grid(const DescriptorView& place, const DescriptorOptions& grid) {
+  if (place.rings == grid.rings && place.sectors == grid.sectors && place.levels == grid.levels) return ok();
+  return Error{"the map describes places on a grid of " + std::to_string(place.rings) + " x " +
+               std::to_string(place.sectors) + " x " + std::to_string(place.levels) +
+               " cells, the parameters on another one: use those that the map was made with"};
+}
+
 Status restore_places(const MapStore& store, const StoredMap& map, const DescriptorOptions& grid,
                       const RestorePlace& restore) {
   for (const auto& each : map.keyframes) {
@@ -124,10 +131,7 @@ Status restore_places(const MapStore& store, const StoredMap& map, const Descrip
     if (bytes->empty()) continue;
     const auto descriptor = to_descriptor(*bytes);
     if (!descriptor) return store.damaged("descriptor", each.frame.frame);
-    if (descriptor->rings != grid.rings || descriptor->sectors != grid.sectors || descriptor->levels != grid.levels)
-      return Error{"the map describes places on a grid of " + std::to_string(descriptor->rings) + " x " +
-                   std::to_string(descriptor->sectors) + " x " + std::to_string(descriptor->levels) +
-                   " cells, the parameters on another one: use those that the map was made with"};
+    if (Status same = check_grid(*descriptor, grid); !same) return same;
     restore(each, *descriptor);
   }
   return ok();

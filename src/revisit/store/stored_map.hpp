@@ -35,6 +35,9 @@ Result<StoredMap> read_map(const MapStore& store);
 /// The graph as it was, its key frames settled.
 Status restore_graph(const StoredMap& map, KeyframeGraph& graph);
 
+/// An error where places are described on another grid than the parameters say.
+Status check_grid(const DescriptorView& place, const DescriptorOptions& grid);
+
 /// Calls `restore` for each key frame that is a place: those at places known before are none. An error where one is
 /// damaged, or was described on another grid.
 using RestorePlace = std::function<void(const StoredMap::Keyframe&, const IntensityScanContext&)>;

@@ -2,17 +2,20 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <revisit/bits/occupancy_bits.h>
 #include <revisit/core/ids.hpp>
 #include <revisit/core/result.hpp>
 #include <revisit/descriptors/intensity_scan_context.hpp>
 #include <revisit/retrieval/internal/aligned_vector.hpp>
-#include <revisit/retrieval/internal/mapped_file.hpp>
+#include <revisit/retrieval/internal/saved_bytes.hpp>
 
 namespace revisit::retrieval_internal {
 
@@ -51,6 +54,9 @@ class PlaceStore {
   /// Maps a saved file. Header, size and bounds are checked now, each chunk's images and intensities before they are
   /// first used.
   static Result<std::unique_ptr<PlaceStore>> open(const std::string& path);
+  /// The same of what save() would write; `name` is for errors.
+  static Result<std::unique_ptr<PlaceStore>> open(const std::string& name, SavedBytes bytes);
+  Result<std::vector<std::byte>> to_bytes() const;
   /// Reads everything that has not been checked yet.
   Status check() const;
 
@@ -106,6 +112,9 @@ class PlaceStore {
   }
   bool check(const Chunk& c, ChunkLayout::Part p) const;
   std::uint64_t checksum(const Chunk& c, ChunkLayout::Part p) const;
+  std::size_t saved_bytes() const;
+  using Write = std::function<void(const void* data, std::size_t bytes)>;
+  Status save(const Write& write) const;
   Chunk& append_chunk(std::size_t at, const std::uint8_t* in_file);
 
   std::unique_ptr<std::atomic<Chunk*>[]> chunks_;
@@ -113,7 +122,7 @@ class PlaceStore {
   int rings_ = 0, sectors_ = 0, levels_ = 0;  // set before the first place is published
   ChunkLayout layout_;
   std::string path_;
-  MappedFile file_;
+  SavedBytes file_;
 };
 
 }  // namespace revisit::retrieval_internal

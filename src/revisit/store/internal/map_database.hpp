@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include <revisit/store/internal/database.hpp>
+#include <revisit/store/internal/map_schema.hpp>
+#include <revisit/store/map_store.hpp>
+
+namespace revisit {
+
+struct MapStore::Database {
+  struct Close {
+    void operator()(sqlite3* handle) const { sqlite3_close_v2(handle); }
+  };
+  std::string file;
+  std::unique_ptr<sqlite3, Close> handle;
+
+  store_internal::Statement prepare(const char* sql) const { return {handle.get(), file, sql}; }
+  Status run(const char* sql) const { return prepare(sql).run(); }
+  Error damaged(const char* what, std::int64_t row) const {
+    return {file + ": row " + std::to_string(row) + " of its " + what + " is damaged"};
+  }
+  Status begin() {
+    // SQLite may end a transaction by itself (a full disk): its own state counts.
+    return is_in_transaction() ? ok() : run("BEGIN");
+  }
+  // What it was made of changes.
+  Status drop_index() const { return run("DELETE FROM place_index"); }
+  bool is_in_transaction() const { return sqlite3_get_autocommit(handle.get()) == 0; }
+  static Result<std::unique_ptr<Database>> connect(const std::filesystem::path& path, int flags) {
+    auto database = std::make_unique<Database>();
+    database->file = path.string();
+    sqlite3* handle = nullptr;
+    const int code = sqlite3_open_v2(path.c_str(), &handle, flags, nullptr);
+    database->handle.reset(handle);
+    if (code != SQLITE_OK) return Error{path.string() + ": cannot be opened as a map: " + sqlite3_errstr(code)};
+    constexpr int kPatience_ms = 2000;  // with another program that writes at the moment
+    sqlite3_busy_timeout(handle, kPatience_ms);
+    if (const Status status = store_internal::add_checksum_function(handle, database->file); !status)
+      return status.error();
+    return database;
+  }
+  // A commit is with the system when it returns: it survives the end of the program, whatever ends it.
+  Status journal() {
+    writes = true;
+    for (const char* sql : {"PRAGMA journal_mode=WAL", "PRAGMA synchronous=NORMAL", "PRAGMA cache_size=-8000"})
+      if (const Status status = run(sql); !status) return status;
+    return ok();
+  }
+  // A map that nobody writes is one file, which may be copied, and read where nothing can be written.
+  ~Database() { (void)end_writing(); }
+  Status end_writing() {
+    if (!handle || !std::exchange(writes, false)) return ok();
+    if (is_in_transaction()) (void)run("ROLLBACK");
+    if (const Status status = run("PRAGMA wal_checkpoint(TRUNCATE)"); !status) return status;
+    return run("PRAGMA journal_mode=DELETE");
+  }
+  bool writes = false;
+
+  Database() = default;
+  Database(const Database&) = delete;
+  Database& operator=(const Database&) = delete;
+};
+
+}  // namespace revisit

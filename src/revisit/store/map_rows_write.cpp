@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is added to a map.
+#include <array>
+
+#include <revisit/store/internal/map_database.hpp>
+#include <revisit/store/internal/row_bytes.hpp>
+
+namespace revisit {
+
+using store_internal::bytes_of;
+using store_internal::numbers_of;
+using store_internal::Statement;
+
+Status MapStore::add(const StoredKeyframe& keyframe) {
+  if (const Status begun = database_->begin(); !begun) return begun;
+  if (const Status dropped = database_->drop_index(); !dropped) return dropped;
+  const auto pose = numbers_of(keyframe.T_odom_lidar);
+  const Status added = database_->prepare("INSERT INTO keyframes VALUES(?1,?2,?3,?4,checksum(?1,?2,?3,?4))")
+                           .bind(keyframe.frame.value)
+                           .bind(keyframe.stamp_s)
+                           .bind(std::as_bytes(std::span(pose)))
+                           .bind(std::int64_t{keyframe.starts_segment})
+                           .run();
+  if (!added) return added;
+  for (const auto& [sql, bytes] :
+       {std::pair{"INSERT INTO descriptors VALUES(?1,?2,checksum(?1,?2))", &keyframe.descriptor},
+        {"INSERT INTO places VALUES(?1,?2,checksum(?1,?2))", &keyframe.place},
+        {"INSERT INTO clouds VALUES(?1,?2,checksum(?1,?2))", &keyframe.cloud}})
+    if (!bytes->empty())
+      if (const Status status = database_->prepare(sql).bind(keyframe.frame.value).bind(*bytes).run(); !status)
+        return status;
+  return ok();
+}
+
+Status MapStore::add(const StoredScan& scan) {
+  if (const Status begun = database_->begin(); !begun) return begun;
+  const auto from_keyframe = numbers_of(scan.T_keyframe_lidar), from_odom = numbers_of(scan.T_odom_lidar);
+  return database_->prepare("INSERT INTO scans VALUES(?1,?2,?3,?4,?5,?6,checksum(?1,?2,?3,?4,?5,?6))")
+      .bind(scan.frame.value)
+      .bind(scan.keyframe.value)
+      .bind(scan.stamp_s)
+      .bind(std::as_bytes(std::span(from_keyframe)))
+      .bind(std::as_bytes(std::span(from_odom)))
+      .bind(std::int64_t{scan.is_tracked})
+      .run();
+}
+
+Status MapStore::add(const StoredEdge& edge) {
+  if (const Status begun = database_->begin(); !begun) return begun;
+  const auto pose = numbers_of(edge.T_from_to);
+  std::array<std::optional<double>, 4> of_loop{};
+  if (edge.loop) of_loop = {edge.loop->score, edge.loop->inlier_ratio, edge.loop->rmse_m, edge.loop->probability};
+  Statement statement = database_->prepare(
+      "INSERT INTO edges(from_frame,to_frame,T_from_to,information,score,inlier_ratio,rmse_m,probability,sum) "
+      "VALUES(?1,?2,?3,?4,?5,?6,?7,?8,checksum(?1,?2,?3,?4,?5,?6,?7,?8))");
+  statement.bind(edge.from.value).bind(edge.to.value).bind(std::as_bytes(std::span(pose)));
+  statement.bind(bytes_of(edge.information));
+  for (const auto& value : of_loop) statement.bind(value);
+  return statement.run();
+}
+
+Status MapStore::add(const CandidateRow& answer) {
+  if (const Status begun = database_->begin(); !begun) return begun;
+  Statement statement = database_->prepare("INSERT INTO answers VALUES(?,?,?,?,?)");
+  statement.bind(answer.query.value);
+  if (answer.match)
+    statement.bind(answer.match->value);
+  else
+    statement.bind_null();
+  return statement.bind(answer.score).bind(std::int64_t{answer.accepted}).bind(answer.reason).run();
+}
+
+Status MapStore::set(const StoredSession& session) {
+  if (const Status begun = database_->begin(); !begun) return begun;
+  return database_->prepare("INSERT OR REPLACE INTO sessions VALUES(?1,?2,?3,?4,checksum(?1,?2,?3,?4))")
+      .bind(std::int64_t{session.id})
+      .bind(session.recording)
+      .bind(session.parameters)
+      .bind(session.sensor)
+      .run();
+}
+
+Status MapStore::set_map_poses(std::span<const StoredMapPose> poses) {
+  if (const Status begun = database_->begin(); !begun) return begun;
+  if (const Status dropped = database_->drop_index(); !dropped) return dropped;
+  if (const Status status = database_->run("DELETE FROM map_poses"); !status) return status;
+  Statement statement = database_->prepare("INSERT INTO map_poses VALUES(?1,?2,?3,checksum(?1,?2,?3))");
+  for (const StoredMapPose& each : poses) {
+    const auto pose = numbers_of(each.T_map_lidar);
+    const Status status =
+        statement.bind(each.keyframe.value).bind(std::as_bytes(std::span(pose))).bind(std::int64_t{each.part}).run();
+    if (!status) return status;
+    statement.reset();
+  }
+  return ok();
+}
+
+Status MapStore::set_index(std::span<const std::byte> places, std::span<const StoredMapPose> poses) {
+  if (const Status begun = database_->begin(); !begun) return begun;
+  if (const Status dropped = database_->drop_index(); !dropped) return dropped;
+  constexpr std::size_t kMost_bytes = 990'000'000;  // SQLite's own limit is 1,000,000,000
+  if (places.size() > kMost_bytes) return ok();
+  Bytes rows;
+  for (const StoredMapPose& each : poses) {
+    const store_internal::PoseRow row{each.keyframe.value, each.part, numbers_of(each.T_map_lidar)};
+    const auto bytes = std::as_bytes(std::span(&row, 1));
+    rows.insert(rows.end(), bytes.begin(), bytes.end());
+  }
+  return database_->prepare("INSERT INTO place_index VALUES(0,?1,?2,checksum(?2))").bind(places).bind(rows).run();
+}
+
+Status MapStore::set_note(const std::string& name, const std::string& text) {
+  if (const Status begun = database_->begin(); !begun) return begun;
+  return database_->prepare("INSERT OR REPLACE INTO notes VALUES(?,?)").bind(name).bind(text).run();
+}
+
+}  // namespace revisit
