@@ -5,6 +5,7 @@
 
 #include <revisit/core/text.hpp>
 #include <revisit/localisation/saved_map.hpp>
+#include <revisit/localisation/saved_places.hpp>
 #include <revisit/store/sensor_facts.hpp>
 
 #include "common.hpp"
@@ -57,6 +58,7 @@ int info_of_map(const std::string& path, bool check) {
   if (bounds.size() > 1) std::printf("Between parts nothing was found in common: each has coordinates of its own.\n");
   if (!check) return kDone;
   if (const Status status = map->store()->check(); !status) return fail(status.error());
+  if (const Status status = SavedPlaces::check(path); !status) return fail(status.error());
   std::printf("Every row is what was written.\n");
   return kDone;
 }

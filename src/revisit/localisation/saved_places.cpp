@@ -2,6 +2,7 @@
 #include <revisit/localisation/saved_places.hpp>
 
 #include <algorithm>
+#include <string>
 #include <utility>
 
 #include <revisit/localisation/saved_map.hpp>
@@ -14,37 +15,54 @@ const StoredMapPose& SavedPlaces::pose(FrameId place) const {
 }
 
 Result<SavedPlaces> SavedPlaces::open(const std::filesystem::path& path, const Parameters& parameters) {
-  auto store = open_map(path);
-  if (!store) return store.error();
-  if (const Status held = store->hold(); !held) return held.error();
-  const auto size = store->index_size();
+  // The index is read from the map as it is now, whatever others write while that goes on.
+  auto index = open_map(path);
+  if (!index) return index.error();
+  if (const Status held = index->hold(); !held) return held.error();
+  const auto size = index->index_size();
   if (!size) return size.error();
-  if (*size == 0) return make_index(path, parameters);
-  auto places = open_index(*std::move(store), *size, parameters);
-  if (!places) return places.error();
-  if (const Status released = places->store_->release(); !released) return released.error();
-  return places;
+  return *size == 0 ? make_index(path, parameters) : open_index(*std::move(index), *size, parameters);
 }
 
-Result<SavedPlaces> SavedPlaces::open_index(MapStore store, std::size_t size, const Parameters& parameters) {
-  auto index = PlaceIndex::from_bytes(
-      store.file(), size, [&](std::span<std::byte> to) { return store.read_index(to); }, parameters.retrieval);
-  if (!index) return index.error();
-  auto poses = store.index_poses();
+Status SavedPlaces::check(const std::filesystem::path& path) {
+  auto store = open_map(path);
+  if (!store) return store.error();
+  if (Status held = store->hold(); !held) return held;
+  const auto size = store->index_size();
+  if (!size) return size.error();
+  if (*size == 0) return ok();
+  const auto index = index_of(*std::move(store), *size, {});
+  return index ? index->check() : Status(index.error());
+}
+
+Result<PlaceIndex> SavedPlaces::index_of(MapStore held, std::size_t size, const RetrievalOptions& options) {
+  const auto shared = std::make_shared<MapStore>(std::move(held));  // a function that is copied holds it
+  return PlaceIndex::open(
+      shared->file(), size,
+      [shared](std::size_t offset, std::span<std::byte> to) { return shared->read_index(offset, to); }, options);
+}
+
+Result<SavedPlaces> SavedPlaces::open_index(MapStore held, std::size_t size, const Parameters& parameters) {
+  const std::string file = held.file();
+  auto poses = held.place_poses();
   if (!poses) return poses.error();
-  auto sessions = store.sessions();
+  auto sessions = held.sessions();
   if (!sessions) return sessions.error();
+  auto index = index_of(std::move(held), size, parameters.retrieval);
+  if (!index) return index.error();
   bool is_consistent = poses->size() == index->size() && !poses->empty();
   for (std::size_t i = 0; is_consistent && i < poses->size(); ++i)
     is_consistent = (*poses)[i].keyframe == index->frame(i);
-  if (!is_consistent) return Error{store.file() + ": its place index names other places than its poses do"};
+  if (!is_consistent) return Error{file + ": its place index names other places than its poses do"};
   if (const auto first = index->find(index->frame(0)))
     if (const Status same = check_grid(*first, parameters.descriptor); !same)
-      return Error{store.file() + ": " + same.error().message};
+      return Error{file + ": " + same.error().message};
+  auto store = MapStore::open(file, MapStore::Access::kRead);
+  if (!store) return store.error();
   SavedPlaces places(*std::move(index));
   places.poses_ = *std::move(poses);
   places.sessions_ = *std::move(sessions);
-  places.store_ = std::make_shared<MapStore>(std::move(store));
+  places.store_ = std::make_shared<MapStore>(*std::move(store));
   return places;
 }
 

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <revisit/pipeline/slam.hpp>
+#include <revisit/store/map_store.hpp>
 
 #include "shared_data.hpp"
 #include "synthetic_world.hpp"
@@ -59,6 +60,29 @@ TEST(Localiser, OneScanAnswersFromTheMapOfAnEarlierRun) {
   ASSERT_TRUE(elsewhere);
   EXPECT_FALSE(elsewhere->T_map_lidar);
   EXPECT_FALSE(elsewhere->detection.reason().empty());
+}
+
+// The index lies in a finished map; one that a killed run left is put together.
+TEST(Localiser, AnswersTheSameWhetherTheIndexIsReadOrMade) {
+  const fs::path map = small_map();
+  std::vector<Pose> found;
+  for (const bool is_finished : {true, false}) {
+    if (!is_finished) {
+      auto store = MapStore::open(map / MapStore::kFileName);
+      ASSERT_TRUE(store);
+      EXPECT_GT(*store->index_size(), 0u);
+      ASSERT_TRUE(store->set_map_poses(*store->map_poses()));  // poses that change make the index old
+      ASSERT_TRUE(store->commit());
+      EXPECT_EQ(*store->index_size(), 0u);
+      ASSERT_TRUE(store->close());
+    }
+    auto localiser = Localiser::open(map);
+    ASSERT_TRUE(localiser) << localiser.error().message;
+    const auto located = localiser->locate(town().scan(SyntheticWorld::at(3.3, 0.7, 1.0), kSensor, 900));
+    ASSERT_TRUE(located && located->T_map_lidar);
+    found.push_back(*located->T_map_lidar);
+  }
+  EXPECT_TRUE(found[0].isApprox(found[1], 1e-9));
 }
 
 // Found, followed, carried elsewhere, found again.

@@ -215,8 +215,9 @@ Status SlamBackEnd::write_map_poses() {
   for (const FrameId frame : graph_.keyframes())
     poses.push_back({frame, graph_.T_world_lidar(frame), graph_.part(frame)});
   if (Status written = store_->set_map_poses(poses); !written) return written;
-  const auto index = recognition_.index().to_bytes();
-  return index ? store_->set_index(*index, poses_of_places()) : Status(index.error());
+  const Status saved = recognition_.index().save(
+      [this](std::size_t offset, std::span<const std::byte> piece) { return store_->add_index(offset, piece); });
+  return saved ? store_->set_place_poses(poses_of_places()) : saved;
 }
 
 std::vector<StoredMapPose> SlamBackEnd::poses_of_places() const {

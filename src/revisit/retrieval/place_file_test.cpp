@@ -3,9 +3,13 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <span>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -87,6 +91,42 @@ TEST_F(PlaceFile, AnswersAsTheIndexThatWasSavedAndGrowsOn) {
   }
 }
 
+// The pieces lie anywhere, as in the rows of a map.
+TEST_F(PlaceFile, InPiecesItAnswersTheSameAndNoticesWhatWasAltered) {
+  const PlaceIndex saved = filled(5000);
+  std::map<std::size_t, std::vector<std::byte>> pieces;
+  std::size_t size = 0;
+  ASSERT_TRUE(saved.save([&](std::size_t offset, std::span<const std::byte> bytes) {
+    pieces[offset] = {bytes.begin(), bytes.end()};
+    size = std::max(size, offset + bytes.size());
+    return ok();
+  }));
+  const auto read = [&](std::size_t offset, std::span<std::byte> to) -> Status {
+    const auto found = pieces.find(offset);
+    if (found == pieces.end() || found->second.size() != to.size()) return Error{"no such piece"};
+    std::copy(found->second.begin(), found->second.end(), to.begin());
+    return ok();
+  };
+  {
+    const auto opened = PlaceIndex::open("pieces", size, read, options());
+    ASSERT_TRUE(opened) << opened.error().message;
+    const auto expected = *saved.search(small_context(699), saved.size());
+    const auto found = opened->search(small_context(699), opened->size());
+    ASSERT_TRUE(found);
+    ASSERT_EQ(found->size(), expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_EQ((*found)[i].match, expected[i].match);
+    EXPECT_TRUE(opened->check());
+  }
+  for (auto& [offset, bytes] : pieces) {
+    bytes.back() ^= std::byte{1};
+    const auto opened = PlaceIndex::open("pieces", size, read, options());
+    const Status status = opened ? opened->check() : Status(opened.error());
+    EXPECT_FALSE(status) << "the piece at " << offset;
+    bytes.back() ^= std::byte{1};
+  }
+  EXPECT_FALSE(PlaceIndex::open("pieces", size - 1, read, options()));
+}
+
 TEST_F(PlaceFile, IsRefusedWhereverItWasAltered) {
   ASSERT_TRUE(filled(4500).save(path));
   const std::string good = bytes(path);
@@ -125,7 +165,7 @@ TEST_F(PlaceFile, ErrorsSayWhatWasAllowed) {
   ASSERT_TRUE(filled(5).save(path));
   std::string other = bytes(path);
   other[12] = 9;
-  EXPECT_NE(error_of(written(other)).find("version 9, this program reads version 1"), std::string::npos);
+  EXPECT_NE(error_of(written(other)).find("version 9, this program reads version 2"), std::string::npos);
   EXPECT_NE(error_of(written("a text file that is long enough to hold a header")).find("no place index"),
             std::string::npos);
   EXPECT_NE(error_of(folder).find("no regular file"), std::string::npos);

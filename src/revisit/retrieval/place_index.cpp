@@ -126,14 +126,11 @@ Result<PlaceIndex> PlaceIndex::open(const std::string& path, const RetrievalOpti
   return PlaceIndex(options, *std::move(store));
 }
 
-Result<std::vector<std::byte>> PlaceIndex::to_bytes() const { return store_->to_bytes(); }
+Status PlaceIndex::save(const WritePiece& write) const { return store_->save(write); }
 
-Result<PlaceIndex> PlaceIndex::from_bytes(const std::string& name, std::size_t size,
-                                          const std::function<Status(std::span<std::byte>)>& read,
-                                          const RetrievalOptions& options) {
-  retrieval_internal::AlignedVector<std::uint8_t> bytes(size);
-  if (const Status status = read(std::as_writable_bytes(std::span(bytes))); !status) return status.error();
-  auto store = Store::open(name, retrieval_internal::SavedBytes(std::move(bytes)));
+Result<PlaceIndex> PlaceIndex::open(const std::string& name, std::size_t size, ReadPiece read,
+                                    const RetrievalOptions& options) {
+  auto store = Store::open(name, size, std::move(read));
   if (!store) return store.error();
   return PlaceIndex(options, *std::move(store));
 }

@@ -67,12 +67,14 @@ class PlaceIndex {
   /// Opens a saved index, to search and to go on adding. Refused are files that are no index, of another version, cut
   /// off or altered.
   static Result<PlaceIndex> open(const std::string& path, const RetrievalOptions& options);
-  /// The same bytes, to lie within another file.
-  Result<std::vector<std::byte>> to_bytes() const;
-  /// `read` fills the room for `size` of them; `name` is for errors.
-  static Result<PlaceIndex> from_bytes(const std::string& name, std::size_t size,
-                                       const std::function<Status(std::span<std::byte>)>& read,
-                                       const RetrievalOptions& options);
+  /// The same file in pieces, which lie within another one. Each is read as it was written, by one thread at a time:
+  /// what is used first at first, the rest in the background; then `read` is destroyed. `size` is what they have
+  /// together; `name` is for errors.
+  using WritePiece = std::function<Status(std::size_t offset, std::span<const std::byte> bytes)>;
+  using ReadPiece = std::function<Status(std::size_t offset, std::span<std::byte> to)>;
+  Status save(const WritePiece& write) const;
+  static Result<PlaceIndex> open(const std::string& name, std::size_t size, ReadPiece read,
+                                 const RetrievalOptions& options);
   /// Reads all that open() left to be checked on first use.
   Status check() const;
 

@@ -16,8 +16,8 @@ ChunkLayout::ChunkLayout(int rings, int sectors, int levels)
   constexpr std::size_t kBytesOfBounds =
       REVISIT_BITS_COLUMNS + sizeof(std::uint32_t) + sizeof(std::int64_t) + sizeof(double);
   begin[kImages] = kPlaces * kBytesOfBounds;  // whole pages, for 4,096 places
-  begin[kIntensities] = begin[kImages] + kPlaces * place;
-  begin[kParts] = begin[kIntensities] + kPlaces * cells;
+  for (std::size_t part = kImages; part < kParts; ++part)
+    begin[part + 1] = begin[part] + kGroup * (part < kIntensities ? place : cells);
 }
 
 PlaceStore::~PlaceStore() {
@@ -31,7 +31,7 @@ PlaceStore::~PlaceStore() {
 PlaceStore::Chunk& PlaceStore::append_chunk(std::size_t at, const std::uint8_t* in_file) {
   std::unique_ptr<Chunk> fresh(new Chunk{layout_, {}, in_file});
   if (in_file == nullptr) {
-    fresh->owned.resize(layout_.begin[ChunkLayout::kParts]);
+    fresh->owned.assign(layout_.begin[ChunkLayout::kParts], 0);
     fresh->data = fresh->owned.data();
   }
   Chunk* const chunk = fresh.release();
@@ -80,7 +80,8 @@ void PlaceStore::add(FrameId frame, double stamp_s, const IntensityScanContext& 
 std::optional<DescriptorView> PlaceStore::descriptor(std::size_t i) const {
   const revisit_bits_place* const found = place(i);
   const Chunk& c = chunk(i);
-  if (found == nullptr || !is_intact(c, ChunkLayout::kIntensities)) return std::nullopt;
+  if (found == nullptr || !is_intact(c, ChunkLayout::kIntensities + i % kChunk / ChunkLayout::kGroup))
+    return std::nullopt;
   return DescriptorView(rings_, sectors_, levels_, c.part(ChunkLayout::kIntensities) + i % kChunk * layout_.cells,
                         image_of(found));
 }

@@ -115,25 +115,26 @@ Result<std::vector<CandidateRow>> MapStore::answers() const {
 }
 
 Result<std::size_t> MapStore::index_size() const {
-  Statement statement = database_->prepare("SELECT length(places) FROM place_index");
+  Statement statement =
+      database_->prepare("SELECT offset+length(bytes) FROM place_index ORDER BY offset DESC LIMIT 1");
   if (statement.step()) return static_cast<std::size_t>(statement.integer(0));
   if (const Status status = statement.status(); !status) return status.error();
   return std::size_t{0};
 }
 
-Status MapStore::read_index(std::span<std::byte> to) const {
-  sqlite3_blob* blob = nullptr;
-  sqlite3* const handle = database_->handle.get();
-  int code = sqlite3_blob_open(handle, "main", "place_index", "places", 0, 0, &blob);
-  if (code == SQLITE_OK) code = sqlite3_blob_read(blob, to.data(), static_cast<int>(to.size()), 0);
-  sqlite3_blob_close(blob);
-  if (code == SQLITE_OK) return ok();
-  return Error{database_->file + ": its place index cannot be read: " + sqlite3_errstr(code)};
+Status MapStore::read_index(std::size_t offset, std::span<std::byte> piece) const {
+  Statement statement = database_->prepare("SELECT bytes FROM place_index WHERE offset=?");
+  if (statement.bind(static_cast<std::int64_t>(offset)).step() && statement.bytes(0).size() == piece.size()) {
+    std::memcpy(piece.data(), statement.bytes(0).data(), piece.size());
+    return ok();
+  }
+  if (const Status status = statement.status(); !status) return status.error();
+  return Error{database_->file + ": its place index is damaged: restore the file from a copy"};
 }
 
-Result<std::vector<StoredMapPose>> MapStore::index_poses() const {
+Result<std::vector<StoredMapPose>> MapStore::place_poses() const {
   std::vector<StoredMapPose> poses;
-  Statement statement = database_->prepare("SELECT poses,sum=checksum(poses) FROM place_index");
+  Statement statement = database_->prepare("SELECT bytes,sum=checksum(bytes) FROM place_poses");
   if (statement.step()) {
     const auto bytes = statement.bytes(0);
     const Error damaged{database_->file + ": the poses of its places are damaged: restore the file from a copy"};
@@ -188,7 +189,7 @@ Status MapStore::check() const {
   if (whole.text(0) != "ok") return Error{database_->file + ": is damaged: " + whole.text(0)};
   const auto status_of = [](const auto& rows) { return rows ? ok() : Status(rows.error()); };
   for (const Status& status :
-       {status_of(sessions()), status_of(keyframes()), status_of(map_poses()), status_of(scans()), status_of(edges())})
+       {status_of(sessions()), status_of(keyframes()), status_of(map_poses()), status_of(place_poses()), status_of(scans()), status_of(edges())})
     if (!status) return status;
   for (const PartTable& table : kParts) {
     Statement statement = database_->prepare(table.count_damaged);

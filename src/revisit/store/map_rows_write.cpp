@@ -95,18 +95,24 @@ Status MapStore::set_map_poses(std::span<const StoredMapPose> poses) {
   return ok();
 }
 
-Status MapStore::set_index(std::span<const std::byte> places, std::span<const StoredMapPose> poses) {
+Status MapStore::add_index(std::size_t offset, std::span<const std::byte> piece) {
   if (const Status begun = database_->begin(); !begun) return begun;
-  if (const Status dropped = database_->drop_index(); !dropped) return dropped;
-  constexpr std::size_t kMost_bytes = 990'000'000;  // SQLite's own limit is 1,000,000,000
-  if (places.size() > kMost_bytes) return ok();
+  return database_->prepare("INSERT INTO place_index VALUES(?,?)")
+      .bind(static_cast<std::int64_t>(offset))
+      .bind(piece)
+      .run();
+}
+
+Status MapStore::set_place_poses(std::span<const StoredMapPose> poses) {
+  if (const Status begun = database_->begin(); !begun) return begun;
   Bytes rows;
+  rows.reserve(poses.size() * sizeof(store_internal::PoseRow));
   for (const StoredMapPose& each : poses) {
     const store_internal::PoseRow row{each.keyframe.value, each.part, numbers_of(each.T_map_lidar)};
     const auto bytes = std::as_bytes(std::span(&row, 1));
     rows.insert(rows.end(), bytes.begin(), bytes.end());
   }
-  return database_->prepare("INSERT INTO place_index VALUES(0,?1,?2,checksum(?2))").bind(places).bind(rows).run();
+  return database_->prepare("INSERT OR REPLACE INTO place_poses VALUES(0,?1,checksum(?1))").bind(rows).run();
 }
 
 Status MapStore::set_note(const std::string& name, const std::string& text) {

@@ -30,7 +30,8 @@ CREATE TABLE scans(frame INTEGER PRIMARY KEY, keyframe INTEGER NOT NULL, stamp_s
 CREATE TABLE edges(id INTEGER PRIMARY KEY, from_frame INTEGER NOT NULL, to_frame INTEGER NOT NULL,
   T_from_to BLOB NOT NULL, information BLOB NOT NULL, score REAL, inlier_ratio REAL, rmse_m REAL, probability REAL,
   sum INTEGER NOT NULL);
-CREATE TABLE place_index(id INTEGER PRIMARY KEY, places BLOB NOT NULL, poses BLOB NOT NULL, sum INTEGER NOT NULL);
+CREATE TABLE place_index(offset INTEGER PRIMARY KEY, bytes BLOB NOT NULL);
+CREATE TABLE place_poses(id INTEGER PRIMARY KEY, bytes BLOB NOT NULL, sum INTEGER NOT NULL);
 CREATE TABLE answers(query INTEGER PRIMARY KEY, match INTEGER, score REAL NOT NULL, accepted INTEGER NOT NULL,
   reason TEXT NOT NULL);
 )";

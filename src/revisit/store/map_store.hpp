@@ -98,14 +98,14 @@ class MapStore {
   /// All of them: those of before are forgotten.
   Status set_map_poses(std::span<const StoredMapPose> poses);
 
-  /// What a finished map is opened with at once: its place index (PlaceIndex::to_bytes) and where the places are. Both
-  /// are gone as soon as a key frame or a pose changes. An index beyond 1 GB is not kept.
-  Status set_index(std::span<const std::byte> places, std::span<const StoredMapPose> poses);
-  /// Bytes of the index; 0 where there is none.
+  /// What a finished map is opened with at once: its place index in pieces (PlaceIndex::save), which carry checksums of
+  /// their own, and where the places are. Both are gone as soon as a key frame or a pose changes.
+  Status add_index(std::size_t offset, std::span<const std::byte> piece);
+  Status set_place_poses(std::span<const StoredMapPose> poses);
+  /// Bytes of all pieces; 0 where there is none.
   Result<std::size_t> index_size() const;
-  /// Fills room for index_size() bytes. They carry checksums of their own.
-  Status read_index(std::span<std::byte> to) const;
-  Result<std::vector<StoredMapPose>> index_poses() const;
+  Status read_index(std::size_t offset, std::span<std::byte> piece) const;
+  Result<std::vector<StoredMapPose>> place_poses() const;
 
   /// A note beside the map. A second one of the same name replaces the first.
   Status set_note(const std::string& name, const std::string& text);

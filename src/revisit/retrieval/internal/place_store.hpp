@@ -2,28 +2,32 @@
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <span>
 #include <string>
-#include <vector>
+#include <thread>
 
 #include <revisit/bits/occupancy_bits.h>
 #include <revisit/core/ids.hpp>
 #include <revisit/core/result.hpp>
 #include <revisit/descriptors/intensity_scan_context.hpp>
 #include <revisit/retrieval/internal/aligned_vector.hpp>
-#include <revisit/retrieval/internal/saved_bytes.hpp>
+#include <revisit/retrieval/internal/mapped_file.hpp>
 
 namespace revisit::retrieval_internal {
 
-/// How a chunk of 4,096 places lies in memory, and in a file the same (docs/retrieval.md): three parts, each of
-/// which starts on a page.
+/// How a chunk of 4,096 places lies in memory, and in a file the same (docs/retrieval.md): the bounds of all, then
+/// images and intensities in groups of 256 places. Each of these parts is checked by itself, and starts on a page.
 struct ChunkLayout {
-  static constexpr std::size_t kPlaces = 4096;
-  enum Part : std::uint8_t { kBounds, kImages, kIntensities, kParts };
+  static constexpr std::size_t kPlaces = 4096, kGroup = 256, kGroups = kPlaces / kGroup;
+  static constexpr std::size_t kBounds = 0, kImages = 1, kIntensities = kImages + kGroups,
+                               kParts = kIntensities + kGroups;
 
   ChunkLayout() = default;
   ChunkLayout(int rings, int sectors, int levels);
@@ -51,12 +55,14 @@ class PlaceStore {
 
   /// Writes all places; not while one is being added. The file is replaced only once the new one is complete.
   Status save(const std::string& path) const;
-  /// Maps a saved file. Header, size and bounds are checked now, each chunk's images and intensities before they are
-  /// first used.
+  /// Maps a saved file. Header, size and bounds are checked now, images and intensities before they are first used.
   static Result<std::unique_ptr<PlaceStore>> open(const std::string& path);
-  /// The same of what save() would write; `name` is for errors.
-  static Result<std::unique_ptr<PlaceStore>> open(const std::string& name, SavedBytes bytes);
-  Result<std::vector<std::byte>> to_bytes() const;
+  using Write = std::function<Status(std::size_t offset, std::span<const std::byte> bytes)>;
+  using Read = std::function<Status(std::size_t offset, std::span<std::byte> to)>;
+  /// The same file in pieces, which lie anywhere: each is asked for as it was written, by one thread at a time, what is
+  /// used first at first, the rest in the background; then `read` is destroyed. `name` is for errors.
+  Status save(const Write& write) const;
+  static Result<std::unique_ptr<PlaceStore>> open(const std::string& name, std::size_t size, Read read);
   /// Reads everything that has not been checked yet.
   Status check() const;
 
@@ -70,10 +76,10 @@ class PlaceStore {
   FrameId frame(std::size_t i) const { return FrameId{chunk(i).frames()[i % kChunk]}; }
   /// The latest stamp until this place: it does not decrease, even where stamps do.
   double latest_s(std::size_t i) const { return chunk(i).latest_s()[i % kChunk]; }
-  /// The place and those that follow it in its chunk, `place_bytes()` apart; null where the file was altered.
+  /// The place and those that follow it in its group, `place_bytes()` apart; null where the file was altered.
   const revisit_bits_place* place(std::size_t i) const {
     const Chunk& c = chunk(i);
-    if (!is_intact(c, ChunkLayout::kImages)) return nullptr;
+    if (!is_intact(c, ChunkLayout::kImages + i % kChunk / ChunkLayout::kGroup)) return nullptr;
     return reinterpret_cast<const revisit_bits_place*>(c.part(ChunkLayout::kImages) + i % kChunk * layout_.place);
   }
   std::size_t place_bytes() const { return layout_.place; }
@@ -92,13 +98,15 @@ class PlaceStore {
  private:
   struct Chunk {
     const ChunkLayout& layout;
-    AlignedVector<std::uint8_t> owned;  ///< empty where the chunk lies in a file
+    AlignedVector<std::uint8_t> owned;  ///< empty where the chunk lies in a mapped file
     const std::uint8_t* data;
+    std::size_t offset = 0;  ///< in the file
     std::uint64_t checksums[ChunkLayout::kParts] = {};
     enum State : std::uint8_t { kIntact, kUnchecked, kDamaged };
     mutable std::atomic<std::uint8_t> state[ChunkLayout::kParts] = {};
 
-    const std::uint8_t* part(ChunkLayout::Part p) const { return data + layout.begin[p]; }
+    const std::uint8_t* part(std::size_t p) const { return data + layout.begin[p]; }
+    std::size_t size(std::size_t p) const { return layout.begin[p + 1] - layout.begin[p]; }
     const std::uint8_t* coarse() const { return data; }  ///< [block of 64][column][place]
     const std::uint32_t* occupied() const {
       return reinterpret_cast<const std::uint32_t*>(data + kChunk * REVISIT_BITS_COLUMNS);
@@ -107,14 +115,14 @@ class PlaceStore {
     const double* latest_s() const { return reinterpret_cast<const double*>(frames() + kChunk); }
   };
   const Chunk& chunk(std::size_t i) const { return *chunks_[i / kChunk].load(std::memory_order_acquire); }
-  bool is_intact(const Chunk& c, ChunkLayout::Part p) const {
+  bool is_intact(const Chunk& c, std::size_t p) const {
     return c.state[p].load(std::memory_order_acquire) == Chunk::kIntact || check(c, p);
   }
-  bool check(const Chunk& c, ChunkLayout::Part p) const;
-  std::uint64_t checksum(const Chunk& c, ChunkLayout::Part p) const;
+  bool check(const Chunk& c, std::size_t p) const;
+  std::uint64_t checksum(const Chunk& c, std::size_t p) const;
   std::size_t saved_bytes() const;
-  using Write = std::function<void(const void* data, std::size_t bytes)>;
-  Status save(const Write& write) const;
+  static Result<std::unique_ptr<PlaceStore>> open(const std::string& path, std::size_t size, MappedFile mapped,
+                                                  Read read);
   Chunk& append_chunk(std::size_t at, const std::uint8_t* in_file);
 
   std::unique_ptr<std::atomic<Chunk*>[]> chunks_;
@@ -122,7 +130,12 @@ class PlaceStore {
   int rings_ = 0, sectors_ = 0, levels_ = 0;  // set before the first place is published
   ChunkLayout layout_;
   std::string path_;
-  SavedBytes file_;
+  MappedFile file_;          ///< either this is where the store was opened,
+  bool is_mapped_ = true;
+  mutable std::mutex reading_;
+  Read read_;                ///< or this
+  std::condition_variable_any stopped_;
+  std::jthread background_;  ///< reads the rest; ends before what it reads
 };
 
 }  // namespace revisit::retrieval_internal

@@ -29,7 +29,10 @@ struct MapStore::Database {
     return is_in_transaction() ? ok() : run("BEGIN");
   }
   // What it was made of changes.
-  Status drop_index() const { return run("DELETE FROM place_index"); }
+  Status drop_index() const {
+    const Status dropped = run("DELETE FROM place_index");
+    return dropped ? run("DELETE FROM place_poses") : dropped;
+  }
   bool is_in_transaction() const { return sqlite3_get_autocommit(handle.get()) == 0; }
   static Result<std::unique_ptr<Database>> connect(const std::filesystem::path& path, int flags) {
     auto database = std::make_unique<Database>();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <revisit/retrieval/internal/saved_bytes.hpp>
+#include <revisit/retrieval/internal/mapped_file.hpp>
 
 #include <fcntl.h>
 #include <sys/mman.h>
@@ -11,11 +11,11 @@
 
 namespace revisit::retrieval_internal {
 
-SavedBytes::~SavedBytes() {
-  if (data_ != nullptr && owned_.empty()) ::munmap(const_cast<std::uint8_t*>(data_), size_);
+MappedFile::~MappedFile() {
+  if (data_ != nullptr) ::munmap(const_cast<std::uint8_t*>(data_), size_);
 }
 
-Result<SavedBytes> SavedBytes::map(const std::string& path) {
+Result<MappedFile> MappedFile::open(const std::string& path) {
   const auto failure = [&] { return Error{path + ": " + std::generic_category().message(errno)}; };
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (file < 0) return failure();
@@ -29,7 +29,7 @@ Result<SavedBytes> SavedBytes::map(const std::string& path) {
     ::close(file);
     return Error{path + ": is no regular file"};
   }
-  SavedBytes result;
+  MappedFile result;
   if (status.st_size > 0) {
     void* const data = ::mmap(nullptr, static_cast<std::size_t>(status.st_size), PROT_READ, MAP_PRIVATE, file, 0);
     if (data == MAP_FAILED) {
