@@ -14,7 +14,6 @@ namespace {
 struct Measures {
   static constexpr double kReach = 2.5;             ///< in-plane distance to the nearest centroid, in inlier distances
   static constexpr double kSeenMargin = 2.5;        ///< what ranges within a cell of seen space may be off, likewise
-  static constexpr double kVisibleShare = 0.95;     ///< of the points, the nearest: beyond, the other scan sees little
   static constexpr std::size_t kFewestPoints = 50;  ///< of fewer, nothing can be said
 };
 
@@ -49,14 +48,14 @@ struct DirectionalAgreement {
 
 // The share of the points above ground of `from` that lie on a surface of `to`.
 DirectionalAgreement agreement_one_way(const SurfaceCloud& to, const SurfaceCloud& from, const Pose& T_to_from,
-                                       double inlier_distance_m, double farthest_m) {
+                                       double inlier_distance_m) {
   DirectionalAgreement result;
   const auto seen_margin_m = static_cast<float>(Measures::kSeenMargin * inlier_distance_m);
   const auto reach2 = static_cast<float>(std::pow(Measures::kReach * inlier_distance_m, 2));
   for (std::size_t i = 0; i < from.size(); ++i) {
     if (from.is_ground(i)) continue;
     const Eigen::Vector3d p = T_to_from * from.point(i).cast<double>();
-    if (p.norm() > farthest_m) continue;
+    if (!to.view().holds(p.cast<float>())) continue;
     ++result.visible;
     const auto neighbour = to.nearest(p.cast<float>(), reach2);
     double distance = std::numeric_limits<double>::infinity();
@@ -79,26 +78,14 @@ DirectionalAgreement agreement_one_way(const SurfaceCloud& to, const SurfaceClou
   return result;
 }
 
-double range_that_holds_most(const SurfaceCloud& cloud) {
-  std::vector<float> ranges;
-  for (std::size_t i = 0; i < cloud.size(); ++i)
-    if (!cloud.is_ground(i)) ranges.push_back(cloud.point(i).norm());
-  if (ranges.empty()) return 0.0;
-  const auto rank =
-      ranges.begin() + static_cast<std::ptrdiff_t>(static_cast<double>(ranges.size() - 1) * Measures::kVisibleShare);
-  std::nth_element(ranges.begin(), rank, ranges.end());
-  return static_cast<double>(*rank);
-}
-
 }  // namespace
 
 Agreement measure_agreement(const SurfaceCloud& target, const SurfaceCloud& source, const Pose& T_target_source,
                             double inlier_distance_m) {
-  const double target_range = range_that_holds_most(target), source_range = range_that_holds_most(source);
   DirectionalAgreement forth, back;
   tbb::parallel_invoke(
-      [&] { forth = agreement_one_way(target, source, T_target_source, inlier_distance_m, target_range); },
-      [&] { back = agreement_one_way(source, target, T_target_source.inverse(), inlier_distance_m, source_range); });
+      [&] { forth = agreement_one_way(target, source, T_target_source, inlier_distance_m); },
+      [&] { back = agreement_one_way(source, target, T_target_source.inverse(), inlier_distance_m); });
   Agreement result;
   result.inlier_ratio = std::min(forth.ratio(), back.ratio());
   result.least_fixed =

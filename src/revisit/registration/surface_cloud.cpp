@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/registration/surface_cloud.hpp>
 
+#include <algorithm>
+
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <Eigen/Eigenvalues>
@@ -35,6 +37,30 @@ struct Neighbourhood {
   }
 };
 
+struct Seeing {
+  static constexpr double kShare = 0.95;       ///< of the points above ground, the nearest: beyond, little is seen
+  static constexpr double kOutermost = 0.005;  ///< of all points, the highest and the lowest
+};
+
+float nth(std::vector<float>& values, double share) {
+  if (values.empty()) return 0.f;
+  const auto rank = values.begin() + static_cast<std::ptrdiff_t>(static_cast<double>(values.size() - 1) * share);
+  std::nth_element(values.begin(), rank, values.end());
+  return *rank;
+}
+
+View view_of(const ThinCloud& cloud) {
+  std::vector<float> ranges, slopes;
+  ranges.reserve(cloud.points.size());
+  slopes.reserve(cloud.points.size());
+  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+    const Eigen::Vector3f& p = cloud.points[i];
+    if (cloud.is_ground[i] == 0) ranges.push_back(p.norm());
+    if (const float across_m = p.head<2>().norm(); across_m > 0.f) slopes.push_back(p.z() / across_m);
+  }
+  return {nth(ranges, Seeing::kShare), nth(slopes, Seeing::kOutermost), nth(slopes, 1.0 - Seeing::kOutermost)};
+}
+
 }  // namespace
 
 struct SurfaceCloud::Grid : registration_internal::ColumnGrid {
@@ -45,6 +71,7 @@ SurfaceCloud::SurfaceCloud(ThinCloud cloud) : cloud_(std::move(cloud)) {
   if (cloud_.is_ground.size() != cloud_.points.size()) cloud_.is_ground.assign(cloud_.points.size(), 0);
   if (cloud_.intensity.size() != cloud_.points.size()) cloud_.intensity.assign(cloud_.points.size(), 0.f);
   grid_ = std::make_unique<Grid>(std::span<const Eigen::Vector3f>(cloud_.points), cloud_.voxel_m);
+  view_ = view_of(cloud_);
   normals_.resize(cloud_.points.size());
   constexpr std::size_t kPointsATask = 512;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size(), kPointsATask), [&](const auto& range) {
