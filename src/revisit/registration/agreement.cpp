@@ -2,8 +2,11 @@
 #include <revisit/registration/agreement.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <oneapi/tbb/parallel_invoke.h>
@@ -17,19 +20,48 @@ struct Measures {
   static constexpr std::size_t kFewestPoints = 50;  ///< of fewer, nothing can be said
 };
 
-// Pearson's correlation of pairs.
-struct Correlation {
-  double n = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0;
-  void add(double a, double b) { n += 1.0, x += a, y += b, xx += a * a, yy += b * b, xy += a * b; }
-  double spread_x() const { return n * xx - x * x; }
-  double spread_y() const { return n * yy - y * y; }
-  // Intensities that are all alike tell nothing.
-  bool is_known() const { return n > 0 && spread_x() > 1e-6 * n * n && spread_y() > 1e-6 * n * n; }
-  double value() const { return (n * xy - x * y) / std::sqrt(spread_x() * spread_y()); }
+// Spearman's correlation of pairs of intensities in [0, 1]: of their ranks, since sensors respond to the same surface
+// each by a curve of its own. Ranks to 1 in 256.
+class RankCorrelation {
+ public:
+  void reserve(std::size_t pairs) { pairs_.reserve(pairs); }
+  void add(float a, float b) { pairs_.emplace_back(bin(a), bin(b)); }
+  /// Nothing where either side is all alike.
+  std::optional<double> value() const {
+    std::array<double, kBins> a{}, b{};
+    for (const auto& [of_a, of_b] : pairs_) a[of_a] += 1.0, b[of_b] += 1.0;
+    to_centred_ranks(a);
+    to_centred_ranks(b);
+    double aa = 0.0, bb = 0.0, ab = 0.0;
+    for (const auto& [of_a, of_b] : pairs_) {
+      const double x = a[of_a], y = b[of_b];
+      aa += x * x, bb += y * y, ab += x * y;
+    }
+    const double least_spread = 1e-6 * static_cast<double>(pairs_.size());
+    if (!(aa > least_spread && bb > least_spread)) return std::nullopt;
+    return ab / std::sqrt(aa * bb);
+  }
+
+ private:
+  static constexpr std::size_t kBins = 256;
+  static std::uint8_t bin(float intensity) {
+    return static_cast<std::uint8_t>(255.f * std::clamp(intensity, 0.f, 1.f));
+  }
+  // From how often each value occurs to its mean rank, in shares of all, around 0.
+  void to_centred_ranks(std::array<double, kBins>& counts) const {
+    const double share = 1.0 / static_cast<double>(pairs_.size());
+    double below = 0.0;
+    for (double& each : counts) {
+      const double count = each;
+      each = (below + 0.5 * count) * share - 0.5;
+      below += count;
+    }
+  }
+  std::vector<std::pair<std::uint8_t, std::uint8_t>> pairs_;
 };
 
 struct DirectionalAgreement {
-  Correlation intensities;
+  RankCorrelation intensities;
   std::size_t visible = 0, inliers = 0, seen_through = 0;
   double squared_sum = 0.0;
   Eigen::Matrix3d normals = Eigen::Matrix3d::Zero();  // sum of n n^T over the inliers
@@ -50,6 +82,7 @@ struct DirectionalAgreement {
 DirectionalAgreement agreement_one_way(const SurfaceCloud& to, const SurfaceCloud& from, const Pose& T_to_from,
                                        double inlier_distance_m) {
   DirectionalAgreement result;
+  result.intensities.reserve(from.size());
   const auto seen_margin_m = static_cast<float>(Measures::kSeenMargin * inlier_distance_m);
   const auto reach2 = static_cast<float>(std::pow(Measures::kReach * inlier_distance_m, 2));
   for (std::size_t i = 0; i < from.size(); ++i) {
@@ -68,8 +101,7 @@ DirectionalAgreement agreement_one_way(const SurfaceCloud& to, const SurfaceClou
     if (distance <= inlier_distance_m) {
       ++result.inliers;
       result.normals.noalias() += n * n.transpose();
-      result.intensities.add(static_cast<double>(from.intensity(i)),
-                             static_cast<double>(to.intensity(neighbour->index)));
+      result.intensities.add(from.intensity(i), to.intensity(neighbour->index));
       result.squared_sum += distance * distance;
     } else if (to.seen().look(p.cast<float>(), seen_margin_m) == SeenSpace::Verdict::kThrough) {
       ++result.seen_through;
@@ -83,9 +115,8 @@ DirectionalAgreement agreement_one_way(const SurfaceCloud& to, const SurfaceClou
 Agreement measure_agreement(const SurfaceCloud& target, const SurfaceCloud& source, const Pose& T_target_source,
                             double inlier_distance_m) {
   DirectionalAgreement forth, back;
-  tbb::parallel_invoke(
-      [&] { forth = agreement_one_way(target, source, T_target_source, inlier_distance_m); },
-      [&] { back = agreement_one_way(source, target, T_target_source.inverse(), inlier_distance_m); });
+  tbb::parallel_invoke([&] { forth = agreement_one_way(target, source, T_target_source, inlier_distance_m); },
+                       [&] { back = agreement_one_way(source, target, T_target_source.inverse(), inlier_distance_m); });
   Agreement result;
   result.inlier_ratio = std::min(forth.ratio(), back.ratio());
   result.least_fixed =
@@ -96,8 +127,8 @@ Agreement measure_agreement(const SurfaceCloud& target, const SurfaceCloud& sour
     return known == 0 ? 0.0 : static_cast<double>(a.inliers) / static_cast<double>(known);
   };
   result.free_space_agreement = std::min(undisputed(forth), undisputed(back));
-  if (forth.intensities.is_known() && back.intensities.is_known())
-    result.intensity_correlation = std::min(forth.intensities.value(), back.intensities.value());
+  const auto forth_intensity = forth.intensities.value(), back_intensity = back.intensities.value();
+  if (forth_intensity && back_intensity) result.intensity_correlation = std::min(*forth_intensity, *back_intensity);
   const std::size_t inliers = forth.inliers + back.inliers;
   if (inliers > 0) result.rmse_m = std::sqrt((forth.squared_sum + back.squared_sum) / static_cast<double>(inliers));
   return result;

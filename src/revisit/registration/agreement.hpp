@@ -14,8 +14,8 @@ struct Agreement {
                               ///< reach, among those that the other scan could have seen
   double free_space_agreement = 0.0;  ///< smaller of both directions: inliers among these and the points that stand
                                       ///< where the other scan saw through
-  std::optional<double> intensity_correlation;  ///< smaller of both directions, of inliers and the points they lie on;
-                                                ///< none where intensities are all alike
+  std::optional<double> intensity_correlation;  ///< of ranks; smaller of both directions, of inliers and the points
+                                                ///< they lie on; none where intensities are all alike
   double rmse_m = 0.0;                          ///< point-to-plane, over the inliers above ground of both directions
   /// How well the inliers' surfaces fix the position in the horizontal direction that they fix least: the mean square
   /// of their normals along it, in [0, 0.5]. Along a bare wall 0: a pose may slide there.

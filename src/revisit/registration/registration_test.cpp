@@ -211,14 +211,14 @@ TEST(Agreement, WallsThatTheOtherScanSawThroughCount) {
   const auto room = [](bool with_wall) {
     std::vector<Point> points;
     for (int i = 0; i < 200; ++i)
-      for (int level = 0; level < 6; ++level) {
+      for (int level = 0; level < 12; ++level) {
         const auto along = 0.2f * static_cast<float>(i) - 20.f, z = 0.5f * static_cast<float>(level);
         const float intensity = i % 20 < 10 ? 0.2f : 0.8f;
         for (const float side : {-20.f, 20.f}) {
           points.push_back({along, side, z, intensity});
           if (!(with_wall && side > 0 && std::abs(along) < 10.f)) points.push_back({side, along, z, intensity});
         }
-        if (with_wall && std::abs(along) < 5.f) points.push_back({10.f, along, z, intensity});
+        if (with_wall && level < 6 && std::abs(along) < 5.f) points.push_back({10.f, along, z, intensity});
       }
     return SurfaceCloud(thin(points, {}, 1.0));
   };
@@ -247,6 +247,23 @@ TEST(Agreement, IntensitiesAreComparedWhereThereAreAny) {
   EXPECT_GT(measure_agreement(a, a, Pose::Identity(), 0.4).intensity_correlation.value_or(0.0), 0.99);
   EXPECT_LT(std::abs(measure_agreement(a, b, Pose::Identity(), 0.4).intensity_correlation.value_or(1.0)), 0.1);
   EXPECT_FALSE(measure_agreement(a, c, Pose::Identity(), 0.4).intensity_correlation) << "all alike";
+}
+
+// A sensor that looks up beside one that looks down: what only one of them can see is no disagreement. Nor is another
+// response to the same surface.
+TEST(Agreement, OfTwoSensorsCountsWhatBothCanSee) {
+  const auto scan = [](double down_deg, double up_deg) {
+    Scan taken = SyntheticWorld(31).scan(SyntheticWorld::at(0, 0, 0), {32, 900, down_deg, up_deg});
+    return taken.points;
+  };
+  const SurfaceCloud high(thin(scan(-8.0, 15.0), {}, 1.0));
+  std::vector<Point> below = scan(-24.8, 2.0);
+  const SurfaceCloud low(thin(below, {}, 1.0));
+  const Agreement agreement = measure_agreement(high, low, Pose::Identity(), 0.4);
+  EXPECT_GT(agreement.inlier_ratio, 0.5);
+  for (Point& p : below) p.intensity *= p.intensity;
+  const Agreement curved = measure_agreement(low, SurfaceCloud(thin(below, {}, 1.0)), Pose::Identity(), 0.4);
+  EXPECT_GT(curved.intensity_correlation.value_or(0.0), 0.95);
 }
 
 TEST(ThinForRegistration, WhatFillsFewVoxelsIsThinnedFiner) {

@@ -39,8 +39,8 @@ ThinCloud thin_surfaces(std::span<const Point> points, std::span<const std::uint
 
 /// What a scan could see, as its points show it: without the few that lie farthest out.
 struct View {
-  float farthest_m = 0.f;                        ///< of the points above ground
-  float least_slope = 0.f, greatest_slope = 0.f; ///< height over horizontal range, in the LiDAR's frame
+  float farthest_m = 0.f;                         ///< of the points above ground
+  float least_slope = 0.f, greatest_slope = 0.f;  ///< height over horizontal range, in the LiDAR's frame
 
   bool holds(const Eigen::Vector3f& p) const {
     const float across_m = p.head<2>().norm();
