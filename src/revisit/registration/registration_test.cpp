@@ -256,11 +256,11 @@ TEST(Agreement, OfTwoSensorsCountsWhatBothCanSee) {
     Scan taken = SyntheticWorld(31).scan(SyntheticWorld::at(0, 0, 0), {32, 900, down_deg, up_deg});
     return taken.points;
   };
-  const SurfaceCloud high(thin(scan(-8.0, 15.0), {}, 1.0));
+  const SurfaceCloud high(thin(scan(-6.0, 30.0), {}, 1.0));
   std::vector<Point> below = scan(-24.8, 2.0);
   const SurfaceCloud low(thin(below, {}, 1.0));
   const Agreement agreement = measure_agreement(high, low, Pose::Identity(), 0.4);
-  EXPECT_GT(agreement.inlier_ratio, 0.5);
+  EXPECT_GT(agreement.inlier_ratio, 0.42) << "0.35 of all points";
   for (Point& p : below) p.intensity *= p.intensity;
   const Agreement curved = measure_agreement(low, SurfaceCloud(thin(below, {}, 1.0)), Pose::Identity(), 0.4);
   EXPECT_GT(curved.intensity_correlation.value_or(0.0), 0.95);
