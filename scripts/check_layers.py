@@ -39,6 +39,7 @@ DOORS = {
     "toml++": {"src/revisit/config"},
     "nlohmann/": {"src/revisit/io", "src/revisit/config", "apps"},
     "embree": {"src/revisit/simulation"},
+    "GeographicLib/": {"src/revisit/mapping", "src/revisit/simulation"},
     "sqlite3": {"src/revisit/io", "src/revisit/store"},
     "lz4": {"src/revisit/io"},
     "zstd": {"src/revisit/io"},

@@ -99,6 +99,35 @@ TEST(MapCli, AddsASessionAndTellsOfIt) {
   EXPECT_NE(scored.output.find(" 0 wrong joins"), std::string::npos) << scored.output;
 }
 
+// By way of a bag, as a robot records it.
+TEST(MapCli, GpsPlacesAMapOnTheEarth) {
+  const fs::path folder = fresh_folder(), bag = folder / "drive.mcap", map = folder / "map", out = folder / "out";
+  const fs::path drive = folder / "long.toml";
+  std::ofstream(drive) << "[simulation]\nsensor = \"vlp16\"\nlength_m = 60\ngps = true\n";
+  ASSERT_EQ(run("simulate --parameters " + drive.string() + " --out " + bag.string()).code, 0);
+  EXPECT_NE(run("info " + bag.string()).output.find("/fix"), std::string::npos);
+  const auto made = run("slam " + bag.string() + " --gps --no-map --out " + map.string());
+  ASSERT_EQ(made.code, 0) << made.output;
+  const auto info = run("info --check " + map.string());
+  EXPECT_NE(info.output.find("UTM 32N (EPSG:32632)"), std::string::npos) << info.output;
+  const auto exported = run("export " + map.string() + " --as tum --utm --out " + out.string());
+  ASSERT_EQ(exported.code, 0) << exported.output;
+  const auto poses = read_poses(out / "session_0.tum");
+  ASSERT_TRUE(poses);
+  // The simulated receiver is at 49 degrees north, 8.4 degrees east.
+  const Eigen::Vector3d at = poses->rows.front().T_world_body.translation();
+  EXPECT_NEAR(at.x(), 456114.6, 500.0);
+  EXPECT_NEAR(at.y(), 5427629.2, 500.0);
+  EXPECT_TRUE(fs::exists(out / "utm.json"));
+  // What does not fit together is said.
+  const std::string plain = drive_of_day(folder, 0).string();
+  const auto without = run("slam " + plain + " --gps --no-map --out " + (folder / "without").string());
+  EXPECT_NE(without.output.find("no GPS fix"), std::string::npos) << without.output;
+  const Maps maps;
+  const auto nowhere = run("export " + maps.map.string() + " --as tum --utm --out " + out.string());
+  EXPECT_NE(nowhere.output.find("--gps"), std::string::npos) << nowhere.output;
+}
+
 TEST(MapCli, MergesAndExports) {
   const Maps maps(true);
   const fs::path folder = maps.folder, all = folder / "all.revisit";

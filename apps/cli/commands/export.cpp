@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <fstream>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <set>
 
@@ -7,6 +10,7 @@
 #include <revisit/io/pose_file.hpp>
 #include <revisit/localisation/saved_map.hpp>
 #include <revisit/mapping/build_map.hpp>
+#include <revisit/mapping/earth_frame.hpp>
 #include <revisit/mapping/occupancy_grid.hpp>
 #include <revisit/store/keyframe_bytes.hpp>
 
@@ -21,6 +25,7 @@ namespace fs = std::filesystem;
 struct ExportOptions {
   std::string map, out, as;
   int part = 0;
+  bool utm = false;
   OccupancyGrid::Options grid;
   ParameterFlags parameters;
 };
@@ -29,7 +34,39 @@ struct ExportOptions {
 struct Part {
   std::vector<FrameId> frames;
   std::vector<Pose> poses;
+  Eigen::Vector3d offset_m = Eigen::Vector3d::Zero();  ///< what the poses are to be moved by
 };
+
+// On the grid of a UTM zone. Points are kept as 32-bit numbers, which hold no millions: an offset stands beside them.
+Status put_on_earth(const SavedMap& map, const ExportOptions& options, Part& part) {
+  const auto fixes = map.store()->fixes();
+  if (!fixes) return fixes.error();
+  const auto earth = map.store()->earth();
+  if (!earth) return earth.error();
+  const auto of_part =
+      std::find_if(earth->begin(), earth->end(), [&](const StoredEarth& each) { return each.part == options.part; });
+  if (of_part == earth->end())
+    return Error{options.map +
+                 ": does not know where on the earth it is: it was made without --gps, or with too few "
+                 "fixes (see info)"};
+  const GpsFix& origin = fixes->front().fix;
+  const EarthFrame frame(origin.latitude_deg, origin.longitude_deg, origin.altitude_m);
+  for (Pose& T : part.poses) T = frame.to_utm(of_part->T_earth_map * T);
+  const bool is_points = options.as != "tum" && options.as != "grid";
+  if (is_points) {
+    constexpr double kRound_m = 100.0;
+    part.offset_m = kRound_m * (part.poses.front().translation() / kRound_m).array().floor();
+    part.offset_m.z() = 0.0;
+    for (Pose& T : part.poses) T.translation() -= part.offset_m;
+  }
+  const fs::path file = fs::path(options.out) / "utm.json";
+  const bool is_in_file = options.as == "las";
+  std::ofstream json(file);
+  json << format("{\"epsg\": %d, \"zone\": \"%s\", \"add_to_xyz_m\": [%.1f, %.1f, 0.0]}\n", frame.epsg(),
+                 frame.utm_zone().c_str(), is_in_file ? 0.0 : part.offset_m.x(), is_in_file ? 0.0 : part.offset_m.y());
+  json.close();
+  return json ? ok() : Status(Error{file.string() + ": cannot be written"});
+}
 
 Result<Part> find_part(const SavedMap& map, int number) {
   Part part;
@@ -50,7 +87,7 @@ Result<Part> find_part(const SavedMap& map, int number) {
 Status export_points(const SavedMap& map, const Part& part, const ExportOptions& options, double voxel_m) {
   const MapStore& store = *map.store();
   const MapInput input{part.poses, [&](std::size_t i) { return read_map_points(store, part.frames[i]); }};
-  MapOptions how{.voxel_m = voxel_m, .formats = {}};
+  MapOptions how{.voxel_m = voxel_m, .formats = {}, .las_offset_m = part.offset_m};
   if (options.as == "ply") how.formats = {CloudFormat::kPly};
   if (options.as == "pcd") how.formats = {CloudFormat::kPcd};
   if (options.as == "las") how.formats = {CloudFormat::kLas};
@@ -102,14 +139,15 @@ Status export_grid(const SavedMap& map, const Part& part, const ExportOptions& o
 
 // A file a session: every scan of it, in the coordinates of the map.
 Status export_trajectories(const SavedMap& map, const Part& part, const ExportOptions& options) {
-  const std::set<FrameId> frames(part.frames.begin(), part.frames.end());
+  std::map<FrameId, Pose> T_out_keyframe;
+  for (std::size_t i = 0; i < part.frames.size(); ++i) T_out_keyframe[part.frames[i]] = part.poses[i];
   const auto scans = map.store()->scans();
   if (!scans) return scans.error();
   std::map<int, Trajectory> sessions;
   for (const StoredScan& scan : *scans)
-    if (frames.contains(scan.keyframe))
-      sessions[session_of(scan.frame)].entries[in_recording(scan.frame)] = {
-          scan.stamp_s, map.T_map_lidar(scan.keyframe) * scan.T_keyframe_lidar};
+    if (const auto T = T_out_keyframe.find(scan.keyframe); T != T_out_keyframe.end())
+      sessions[session_of(scan.frame)].entries[in_recording(scan.frame)] = {scan.stamp_s,
+                                                                            T->second * scan.T_keyframe_lidar};
   for (const auto& [session, trajectory] : sessions)
     if (const Status status =
             write_tum_poses(fs::path(options.out) / ("session_" + std::to_string(session) + ".tum"), trajectory);
@@ -123,11 +161,13 @@ int run_export(const ExportOptions& options) {
   if (!parameters) return fail(parameters.error(), kUsage);
   const auto map = SavedMap::open(options.map);
   if (!map) return fail(map.error());
-  const auto part = find_part(*map, options.part);
+  auto part = find_part(*map, options.part);
   if (!part) return fail({options.map + ": " + part.error().message});
   std::error_code failure;
   fs::create_directories(options.out, failure);
   if (failure) return fail({options.out + ": cannot be created: " + failure.message()});
+  if (options.utm)
+    if (const Status placed = put_on_earth(*map, options, *part); !placed) return fail(placed.error());
   listen_for_interrupt();
   const Status status = options.as == "grid"  ? export_grid(*map, *part, options)
                         : options.as == "tum" ? export_trajectories(*map, *part, options)
@@ -156,6 +196,9 @@ Run add_export(CLI::App& program) {
       ->check(CLI::IsMember({"ply", "pcd", "las", "tiles", "grid", "tum", "g2o"}));
   command->add_option("--out", options->out, "Folder for the files")->required();
   command->add_option("--part", options->part, "Of a map whose sessions are not all joined: which part (see info)");
+  command->add_flag("--utm", options->utm,
+                    "Of a map made with --gps: in the UTM zone that it lies in, heights above the ellipsoid; utm.json "
+                    "names the zone, and what is to be added to the points of ply, pcd and tiles");
   command->add_option("--cell", options->grid.cell_m, "grid: edge of a cell, m")->check(CLI::Range(0.02, 5.0));
   command->add_option("--clearance", options->grid.clearance_m, "grid: what is lower is driven over, m")
       ->check(CLI::Range(0.0, 2.0));

@@ -6,6 +6,7 @@
 #include <revisit/core/text.hpp>
 #include <revisit/localisation/saved_map.hpp>
 #include <revisit/localisation/saved_places.hpp>
+#include <revisit/mapping/earth_frame.hpp>
 #include <revisit/store/sensor_facts.hpp>
 
 #include "common.hpp"
@@ -45,6 +46,21 @@ int info_of_map(const std::string& path, bool check) {
   for (const auto& [part, box] : bounds) {
     const Eigen::Vector3d size = box.second - box.first;
     std::printf("part %-7d %.0f x %.0f m, heights over %.1f m\n", part, size.x(), size.y(), size.z());
+  }
+  const auto fixes = map->store()->fixes();
+  const auto earth = map->store()->earth();
+  if (!fixes || !earth) return fail(fixes ? earth.error() : fixes.error());
+  if (!earth->empty()) {
+    const GpsFix& origin = fixes->front().fix;
+    const EarthFrame frame(origin.latitude_deg, origin.longitude_deg, origin.altitude_m);
+    for (const StoredEarth& each : *earth) {
+      const Eigen::Vector3d at = frame.geodetic(each.T_earth_map.translation());
+      const Eigen::Vector3d utm_m = frame.to_utm(each.T_earth_map).translation();
+      std::printf(
+          "on the earth part %d begins at %.7f, %.7f degrees, %.1f m; UTM %s (EPSG:%d) %.2f, %.2f; %zu GPS fixes\n",
+          each.part, at.x(), at.y(), at.z(), frame.utm_zone().c_str(), frame.epsg(), utm_m.x(), utm_m.y(),
+          fixes->size());
+    }
   }
   Table table = {{"session", "recording", "key frames", "length", "part"}};
   for (const StoredSession& session : map->stored().sessions) {

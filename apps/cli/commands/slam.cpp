@@ -5,6 +5,8 @@
 #include <tuple>
 
 #include <revisit/core/stopwatch.hpp>
+#include <revisit/core/text.hpp>
+#include <revisit/io/nmea_file.hpp>
 #include <revisit/io/pose_file.hpp>
 #include <revisit/io/result_files.hpp>
 #include <revisit/pipeline/recording_scale.hpp>
@@ -24,6 +26,7 @@ namespace fs = std::filesystem;
 
 struct SlamOptions {
   std::string input, out, into, poses, calibration, odometry, wheels;
+  std::optional<std::string> gps;
   double sweep_s = 0.0;
   bool overwrite = false, resume = false, without_map = false;
   InputFlags recording;
@@ -46,6 +49,24 @@ Result<OtherOdometry> other_odometry(const SlamOptions& options, const Recording
   return OtherOdometry([&recording, poses_of = std::move(trajectory)](std::size_t index) {
     return poses_of.at(recording.frame(index));
   });
+}
+
+// Of an NMEA log, or of the recording's own receiver.
+Result<std::vector<GpsFix>> gps_fixes(const SlamOptions& options, const Recording& recording) {
+  if (!options.gps) return std::vector<GpsFix>();
+  std::error_code failure;
+  const bool is_file = fs::is_regular_file(*options.gps, failure);
+  auto fixes = is_file ? read_nmea(*options.gps) : recording.gps_fixes(*options.gps);
+  if (!fixes) return fixes.error();
+  const std::string what = is_file ? *options.gps : options.input;
+  if (fixes->empty()) return Error{what + ": holds no GPS fix; name an NMEA log, or a topic of NavSatFix"};
+  const double first_s = recording.stamp_s(0), last_s = recording.stamp_s(recording.size() - 1);
+  if (fixes->back().stamp_s < first_s || fixes->front().stamp_s > last_s)
+    return Error{what +
+                 format(": its fixes are of %.1f to %.1f s, the scans of %.1f to %.1f s", fixes->front().stamp_s,
+                        fixes->back().stamp_s, first_s, last_s) +
+                 ": one of the clocks must be set to the other"};
+  return fixes;
 }
 
 // A session is not continued with another recording.
@@ -225,6 +246,8 @@ int slam(const SlamOptions& options) {
   if (!odometry) return fail(odometry.error());
   const auto scale = intensity_scale_of(**recording, parameters->intensity);
   if (!scale) return fail({scale.error().message + "; no scan can be used"});
+  auto gps = gps_fixes(options, **recording);
+  if (!gps) return fail(gps.error());
   if (!scale->warning.empty()) print_log()(LogLevel::kWarning, options.input + ": " + scale->warning);
 
   RunFile run;
@@ -243,6 +266,7 @@ int slam(const SlamOptions& options) {
                   *calibration,
                   options.odometry.empty() ? Odometry::Source::kLidar : Odometry::Source::kExternal,
                   print_log(),
+                  *std::move(gps),
                   !options.into.empty() && !options.resume,
                   run.input,
                   parameters_text(*parameters, options)};
@@ -324,6 +348,11 @@ Run add_slam(CLI::App& program) {
       "--into", options->into,
       "A map of before (file, or folder of --out) that this recording is added to: it is found in it by "
       "its loops, wherever it starts");
+  command
+      ->add_option("--gps", options->gps,
+                   "Places the map on the earth, and keeps it there: by the recording's GPS (sensor_msgs/NavSatFix; "
+                   "with a name, that topic), or by an NMEA log")
+      ->expected(0, 1);
   command->add_option("--poses", options->poses,
                       "Reference poses (KITTI, TUM, g2o), written into the results for `revisit evaluate`; never used "
                       "to track or to find loops");

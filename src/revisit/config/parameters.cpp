@@ -98,6 +98,8 @@ const std::vector<Entry>& table() {
                      "the sensor moves on while it sweeps; false: each scan is taken at once"),
       REVISIT_SWITCH(simulation, imu,
                      "the sensor has an IMU inside, with noise and bias; scans and bags then hold its readings"),
+      REVISIT_SWITCH(simulation, gps,
+                     "the vehicle has a GPS receiver, off by a metre or two and now and then by far more"),
       REVISIT_REAL(simulation, traffic, 0, 5, "how many vehicles and people move about, as a multiple of the default"),
   };
   return entries;

@@ -81,6 +81,7 @@ struct SimulationOptions {
   double tilt_deg = 0.0;          ///< how far a sensor carried by hand leans, at most
   bool motion_distortion = true;  ///< the sensor moves while it sweeps
   bool imu = false;               ///< the sensor has an IMU inside
+  bool gps = false;               ///< the vehicle has a GPS receiver
   double traffic = 1.0;           ///< how many move about, as a multiple of the default
 };
 

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include <revisit/core/gps_fix.hpp>
 #include <revisit/core/imu.hpp>
 #include <revisit/core/pose.hpp>
 #include <revisit/core/result.hpp>
@@ -32,6 +33,7 @@ class BagWriter {
   Status write_scan(const std::string& topic, const std::string& frame_id, const Scan& scan);
   /// `sample` as in a scan with this stamp.
   Status write_imu(const std::string& topic, const std::string& frame_id, double stamp_s, const ImuSample& sample);
+  Status write_fix(const std::string& topic, const std::string& frame_id, const GpsFix& fix);
   Status write_odometry(const std::string& topic, const std::string& frame_id, const std::string& child_frame_id,
                         double stamp_s, const Pose& T_frame_child);
   /// Recorded at `stamp_s`, before the first scan.

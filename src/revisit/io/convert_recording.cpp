@@ -24,7 +24,8 @@ class Target {
 
 class BagTarget final : public Target {
  public:
-  BagTarget(BagWriter writer, fs::path file) : writer_(std::move(writer)), file_(std::move(file)) {}
+  BagTarget(BagWriter writer, fs::path file, std::vector<GpsFix> fixes)
+      : writer_(std::move(writer)), file_(std::move(file)), fixes_(std::move(fixes)) {}
 
   Status add(const Scan& scan, const std::optional<Pose>& T_wheels_lidar) override {
     if (!std::exchange(has_frames_, true))
@@ -37,6 +38,8 @@ class BagTarget final : public Target {
         if (const Status status = writer_.write_imu("/imu", kLidar, scan.stamp_s, sample); !status) return status;
         imu_until_s_ = time_s;
       }
+    for (; next_fix_ < fixes_.size() && fixes_[next_fix_].stamp_s <= scan.stamp_s; ++next_fix_)
+      if (const Status status = writer_.write_fix("/fix", kLidar, fixes_[next_fix_]); !status) return status;
     if (T_wheels_lidar)
       if (const Status status = writer_.write_odometry("/odom", "odom", "base_link", scan.stamp_s, *T_wheels_lidar);
           !status)
@@ -55,6 +58,8 @@ class BagTarget final : public Target {
   static constexpr double kSameTime_s = 1e-6;
   BagWriter writer_;
   fs::path file_;
+  std::vector<GpsFix> fixes_;
+  std::size_t next_fix_ = 0;
   bool has_frames_ = false;
   double imu_until_s_ = -std::numeric_limits<double>::infinity();
 };
@@ -95,11 +100,13 @@ class KittiTarget final : public Target {
   Trajectory wheels_;
 };
 
-Result<std::unique_ptr<Target>> make_target(const fs::path& out) {
+Result<std::unique_ptr<Target>> make_target(const fs::path& out, const Recording& recording) {
   if (is_bag_name(out)) {
+    auto fixes = recording.gps_fixes({});
+    if (!fixes) return fixes.error();
     auto writer = BagWriter::create(out);
     if (!writer) return writer.error();
-    return std::unique_ptr<Target>(std::make_unique<BagTarget>(*std::move(writer), out));
+    return std::unique_ptr<Target>(std::make_unique<BagTarget>(*std::move(writer), out, *std::move(fixes)));
   }
   std::error_code failure;
   if (fs::exists(out, failure) && (!fs::is_directory(out, failure) || !fs::is_empty(out, failure)))
@@ -118,7 +125,7 @@ bool is_bag_name(const fs::path& file) {
 
 Result<Converted> convert_recording(const Recording& recording, const fs::path& out, const LogSink& log,
                                     const std::function<bool(std::size_t)>& on_scan) {
-  auto target = make_target(out);
+  auto target = make_target(out, recording);
   if (!target) return target.error();
   Converted converted;
   bool loses_imu = !is_bag_name(out);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include <revisit/core/gps_fix.hpp>
 #include <revisit/core/log.hpp>
 #include <revisit/core/pose.hpp>
 #include <revisit/core/result.hpp>
@@ -34,6 +35,11 @@ class Recording {
   /// What the wheels (or another odometry) said, in a frame of their own: the pose of the LiDAR at scan `index`.
   virtual bool has_wheel_odometry() const = 0;
   virtual std::optional<Pose> wheel_pose(std::size_t index) const = 0;
+  /// What a GPS receiver said, in the order of its times. `topic`: of a bag, where it has several (NavSatFix).
+  virtual Result<std::vector<GpsFix>> gps_fixes(const std::string& topic) const {
+    (void)topic;
+    return std::vector<GpsFix>();
+  }
   /// Calibration of a KITTI camera, for pose files in its frame.
   virtual std::optional<Pose> T_camera_lidar() const = 0;
   /// What was found and assumed about stamps, point times and other sensors: a line each, for people.

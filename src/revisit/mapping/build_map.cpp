@@ -195,7 +195,7 @@ Result<MapReport> build_map(const MapInput& input, const MapOptions& options, co
     const char* const name = format == CloudFormat::kPly   ? "map.ply"
                              : format == CloudFormat::kPcd ? "map.pcd"
                                                            : "map.las";
-    maps.emplace_back(folder / name, format, report.points);
+    maps.emplace_back(folder / name, format, report.points, options.las_offset_m);
   }
   for (const MapTile& tile : report.tiles)
     if (const Status status = append_tile(tiles / tile.file, tile.points, maps); !status) return status.error();

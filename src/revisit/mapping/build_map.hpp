@@ -20,6 +20,7 @@ struct MapOptions {
   bool thin_moving = true;  ///< leave out what stood there for a moment only
   /// Of the whole map, one file each: map.ply, map.pcd, map.las.
   std::vector<CloudFormat> formats = {CloudFormat::kPly, CloudFormat::kPcd};
+  Eigen::Vector3d las_offset_m = Eigen::Vector3d::Zero();  ///< as for CloudFile
 };
 
 /// One tile of the map: a file that a viewer can load by itself.

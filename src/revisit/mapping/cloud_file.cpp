@@ -27,8 +27,14 @@ void put(std::span<char> bytes, std::size_t at, Value value) {
 
 }  // namespace
 
-CloudFile::CloudFile(const std::filesystem::path& file, CloudFormat format, std::size_t count)
-    : file_(file), format_(format), stream_(file, std::ios::binary | std::ios::trunc), count_(count), left_(count) {
+CloudFile::CloudFile(const std::filesystem::path& file, CloudFormat format, std::size_t count,
+                     const Eigen::Vector3d& las_offset_m)
+    : file_(file),
+      format_(format),
+      stream_(file, std::ios::binary | std::ios::trunc),
+      count_(count),
+      left_(count),
+      las_offset_m_(las_offset_m) {
   write_head();
 }
 
@@ -52,9 +58,11 @@ void CloudFile::write_head() {
     put(head, 107, static_cast<std::uint32_t>(count_));
     put(head, 111, static_cast<std::uint32_t>(count_));  // all are first returns
     for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto i = static_cast<Eigen::Index>(axis);
       put(head, 131 + 8 * axis, Las::kScale_m);
-      put(head, 179 + 16 * axis, highest_[static_cast<Eigen::Index>(axis)]);
-      put(head, 187 + 16 * axis, lowest_[static_cast<Eigen::Index>(axis)]);
+      put(head, 155 + 8 * axis, las_offset_m_[i]);
+      put(head, 179 + 16 * axis, highest_[i] + las_offset_m_[i]);
+      put(head, 187 + 16 * axis, lowest_[i] + las_offset_m_[i]);
     }
     stream_.write(head.data(), head.size());
   }

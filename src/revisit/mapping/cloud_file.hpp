@@ -19,8 +19,10 @@ enum class CloudFormat { kPly, kPcd, kLas };
 /// positions to a millimetre and intensities from 0 to 65535.
 class CloudFile {
  public:
-  /// The header tells how many points follow: add() exactly `count`.
-  CloudFile(const std::filesystem::path& file, CloudFormat format, std::size_t count);
+  /// The header tells how many points follow: add() exactly `count`. `las_offset_m` is added to the points, in the
+  /// header of a LAS file alone.
+  CloudFile(const std::filesystem::path& file, CloudFormat format, std::size_t count,
+            const Eigen::Vector3d& las_offset_m = Eigen::Vector3d::Zero());
   void add(std::span<const Point> points);
   /// Everything is with the system when this returns without an error; the error names the file.
   Status finish();
@@ -33,6 +35,7 @@ class CloudFile {
   CloudFormat format_;
   std::ofstream stream_;
   std::size_t count_, left_;
+  Eigen::Vector3d las_offset_m_;
   Eigen::Vector3d lowest_ = Eigen::Vector3d::Zero(), highest_ = Eigen::Vector3d::Zero();
 };
 

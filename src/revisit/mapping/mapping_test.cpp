@@ -88,7 +88,7 @@ TEST(BuildMap, KeepsWhatStaysAndLeavesOutWhatMoves) {
 // As the ASPRS's table of LAS 1.2 has it.
 TEST(CloudFile, LasHasItsBoundsAndItsPoints) {
   const fs::path file = fresh_folder("las") / "map.las";
-  CloudFile las(file, CloudFormat::kLas, 3);
+  CloudFile las(file, CloudFormat::kLas, 3, {458000.0, 5428000.0, 0.0});
   const std::vector<Point> points{{1.5f, -2.25f, 0.125f, 1.f}, {-10.f, 4.f, 3.f, 0.f}, {0.f, 0.f, -1.f, 0.5f}};
   las.add(std::span(points).first(2));
   las.add(std::span(points).last(1));
@@ -102,8 +102,9 @@ TEST(CloudFile, LasHasItsBoundsAndItsPoints) {
   };
   EXPECT_EQ(all.substr(0, 4), "LASF");
   EXPECT_EQ(at(std::uint32_t{}, 107), 3u);
-  EXPECT_EQ(at(double{}, 179), 1.5) << "largest x";
-  EXPECT_EQ(at(double{}, 187), -10.0) << "smallest x";
+  EXPECT_EQ(at(double{}, 155), 458000.0) << "offset of x";
+  EXPECT_EQ(at(double{}, 179), 458001.5) << "largest x";
+  EXPECT_EQ(at(double{}, 187), 457990.0) << "smallest x";
   EXPECT_EQ(at(double{}, 219), -1.0) << "smallest z";
   EXPECT_EQ(at(std::int32_t{}, 227), 1500);
   EXPECT_EQ(at(std::int32_t{}, 227 + 4), -2250);

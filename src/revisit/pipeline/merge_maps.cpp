@@ -147,6 +147,12 @@ Status Merger::add(const Source& source) {
 }
 
 Status Merger::add_scans(const Source& source) {
+  const auto fixes = source.store.fixes();
+  if (!fixes) return fixes.error();
+  for (StoredFix fix : *fixes) {
+    fix.keyframe = renumbered(fix.keyframe);
+    if (Status added = store_->add(fix); !added) return added;
+  }
   const auto scans = source.store.scans();
   if (!scans) return scans.error();
   for (StoredScan scan : *scans) {

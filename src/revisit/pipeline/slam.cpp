@@ -25,7 +25,9 @@ Slam::Slam(const Parameters& parameters, const SlamSetup& setup, Result<std::sha
       store_(store ? *store : nullptr),
       failure_(store ? ok() : Status(store.error())),
       front_end_(parameters, setup.odometry, setup.scale, setup.calibration, setup.log),
-      back_end_(parameters, setup.odometry, store_, setup.log) {}
+      back_end_(parameters, setup.odometry, store_, setup.log) {
+  back_end_.set_gps(setup.gps);
+}
 
 Result<Slam> Slam::open(const std::filesystem::path& folder, const Parameters& parameters, const SlamSetup& setup) {
   std::error_code failure;

@@ -34,9 +34,10 @@ struct SlamSetup {
   IntensityCalibration calibration = {};
   Odometry::Source odometry = Odometry::Source::kLidar;
   LogSink log = {};
-  bool new_session = false;     ///< another recording enters the map that is there; else its last one goes on
-  std::string recording = {};   ///< of a new session, as the map shall name it
-  std::string parameters = {};  ///< likewise: what must not change while it is made
+  std::vector<GpsFix> gps = {};  ///< of the whole recording, by its clock; used where the graph is settled at the end
+  bool new_session = false;      ///< another recording enters the map that is there; else its last one goes on
+  std::string recording = {};    ///< of a new session, as the map shall name it
+  std::string parameters = {};   ///< likewise: what must not change while it is made
 };
 
 /// Scans in; trajectory, loops and map out, online. Takes scans as a driver delivers them. Everything is kept in a

@@ -2,6 +2,7 @@
 #include <revisit/pipeline/slam_back_end.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -9,6 +10,7 @@
 
 #include <revisit/core/stopwatch.hpp>
 #include <revisit/core/text.hpp>
+#include <revisit/mapping/earth_frame.hpp>
 #include <revisit/pose_graph/edge_information.hpp>
 #include <revisit/store/keyframe_bytes.hpp>
 #include <revisit/store/stored_clouds.hpp>
@@ -65,6 +67,7 @@ Result<SlamBackEnd::Added> SlamBackEnd::add_keyframe(PreparedScan scan, const Od
   entry.place = std::move(scan);
   if (const Status entered = enter_keyframe(std::move(entry), std::move(detection), added); !entered)
     return entered.error();
+  if (const Status fixed = add_fix(frame, stamp_s); !fixed) return fixed.error();
   return added;
 }
 
@@ -200,13 +203,57 @@ Status SlamBackEnd::settle_session() {
 Status SlamBackEnd::finish() {
   std::size_t entered = 0;
   const Status stored = enter(graph_.decide_all(), entered);
-  const Status settled = graph_.settle();
+  const Status settled = settle_all();
   const Status placed = stored && settled ? write_map_poses() : ok();
   const Status learnt = stored && settled ? learn_look_alikes() : ok();
   const Status committed = store_->commit();
   for (const Status* each : {&stored, &settled, &placed, &learnt})
     if (!*each) return *each;
   return committed;
+}
+
+// The fix of a key frame, between the two that came before and after it. A receiver's error hardly changes from one key
+// frame to the next: of those that lie together, one is kept.
+Status SlamBackEnd::add_fix(FrameId keyframe, double stamp_s) {
+  constexpr double kGap_s = 1.5, kApart_m = 10.0;
+  const Eigen::Vector3d at_m = graph_.T_world_lidar(keyframe).translation();
+  if (last_fix_at_m_ && (at_m - *last_fix_at_m_).norm() < kApart_m) return ok();
+  const auto after = std::lower_bound(gps_.begin(), gps_.end(), stamp_s,
+                                      [](const GpsFix& each, double time_s) { return each.stamp_s < time_s; });
+  if (after == gps_.begin() || after == gps_.end()) return ok();
+  const GpsFix &a = *(after - 1), &b = *after;
+  const double gap_s = b.stamp_s - a.stamp_s, share = (stamp_s - a.stamp_s) / gap_s;
+  const bool crosses = std::abs(a.longitude_deg - b.longitude_deg) > 180.0;  // the date line
+  if (!(gap_s > 0.0 && gap_s < kGap_s) || crosses) return ok();
+  const auto between = [share](double from, double to) { return from + share * (to - from); };
+  last_fix_at_m_ = at_m;
+  return store_->add(
+      StoredFix{keyframe,
+                {stamp_s, between(a.latitude_deg, b.latitude_deg), between(a.longitude_deg, b.longitude_deg),
+                 between(a.altitude_m, b.altitude_m), a.deviation_m.cwiseMax(b.deviation_m)}});
+}
+
+// The whole graph, on the earth where fixes tell.
+Status SlamBackEnd::settle_all() {
+  const auto fixes = store_->fixes();
+  if (!fixes) return fixes.error();
+  if (fixes->empty()) return graph_.settle();
+  const GpsFix& origin = fixes->front().fix;
+  const EarthFrame earth(origin.latitude_deg, origin.longitude_deg, origin.altitude_m);
+  std::vector<KeyframeGraph::Fix> on_earth;
+  on_earth.reserve(fixes->size());
+  for (const StoredFix& each : *fixes)
+    on_earth.push_back({each.keyframe, earth.east_north_up_m(each.fix), each.fix.deviation_m});
+  const auto placed = graph_.settle_on_earth(on_earth);
+  if (!placed) return placed.error();
+  std::vector<StoredEarth> parts;
+  for (const auto& [part, T_earth_map] : *placed) parts.push_back({part, T_earth_map});
+  if (parts.empty())
+    log_to(log_, LogLevel::kWarning,
+           "GPS: " + std::to_string(fixes->size()) +
+               " fixes do not tell how the map lies on the earth: too few, or too near "
+               "to each other");
+  return store_->set_earth(parts);
 }
 
 Status SlamBackEnd::write_map_poses() {

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include <revisit/core/gps_fix.hpp>
 #include <revisit/odometry/odometry.hpp>
 #include <revisit/pipeline/detection.hpp>
 #include <revisit/pipeline/place_recognition.hpp>
@@ -26,6 +28,8 @@ class SlamBackEnd {
   };
   /// An error where the store failed: it and the graph are then no longer the same.
   Result<Added> add_keyframe(PreparedScan scan, const OdometryStep& odometry, const SensorFacts& sensor);
+  /// What a receiver said meanwhile, in the order of its times, by the recording's clock.
+  void set_gps(std::vector<GpsFix> fixes) { gps_ = std::move(fixes); }
   /// A key frame of another map enters this one, and is looked for among the first `places` of it.
   struct Entry {
     StoredKeyframe row;  ///< the bytes of `place` need not be there
@@ -52,12 +56,16 @@ class SlamBackEnd {
   Result<Detection> find_loop(const PreparedScan& keyframe, const SensorFacts& sensor);
   KeyframeGraph::OdometryEdge edge_to(const TrajectoryPoint& point, const Matrix6& information) const;
   Status write_map_poses();
+  Status add_fix(FrameId keyframe, double stamp_s);
+  Status settle_all();
   std::vector<StoredMapPose> poses_of_places() const;
   Status learn_look_alikes();
   Status settle_session();
   Status enter_keyframe(Entry entry, Result<Detection> detection, Added& added);
   Status enter(const std::vector<LoopGate::Decision>& decisions, std::size_t& entered);
 
+  std::vector<GpsFix> gps_;
+  std::optional<Eigen::Vector3d> last_fix_at_m_;  ///< where in the graph the last one was that was kept
   FrameTime time_in_index(const FrameTime& frame);
 
   StoredSession session_;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include <revisit/pose_graph/earth.hpp>
+
 namespace revisit {
 namespace {
 
@@ -62,6 +64,23 @@ Status KeyframeGraph::settle_if_due() {
 }
 
 Status KeyframeGraph::settle() { return loops_unsettled_ == 0 ? ok() : optimise(PoseGraph::kExactly); }
+
+Result<std::map<int, Pose>> KeyframeGraph::settle_on_earth(std::span<const Fix> fixes) {
+  if (const Status settled = settle(); !settled) return settled.error();
+  std::vector<EarthFix> of_nodes;
+  of_nodes.reserve(fixes.size());
+  for (const Fix& fix : fixes)
+    if (has(fix.keyframe)) of_nodes.push_back({node_of_.at(fix.keyframe), fix.position_m, fix.deviation_m});
+  std::vector<int> parts;
+  parts.reserve(keyframes_.size());
+  for (const FrameId frame : keyframes_) parts.push_back(part(frame));
+  const auto placed = revisit::settle_on_earth(graph_, of_nodes, parts);
+  if (!placed) return placed.error();
+  std::map<int, Pose> T_earth_world;
+  for (std::size_t part = 0; part < placed->size(); ++part)
+    if ((*placed)[part]) T_earth_world[static_cast<int>(part)] = *(*placed)[part];
+  return T_earth_world;
+}
 
 Status KeyframeGraph::optimise(double settled) {
   const auto report = graph_.optimise(settled);

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <revisit/core/loop.hpp>
@@ -42,6 +43,13 @@ class KeyframeGraph {
   Status settle_if_due();
   /// The same at once, and to the last digit.
   Status settle();
+
+  struct Fix {
+    FrameId keyframe;
+    Eigen::Vector3d position_m = Eigen::Vector3d::Zero(), deviation_m = Eigen::Vector3d::Ones();
+  };
+  /// The same as settle(), with these (EarthFix): for each part that they place, T_earth_world.
+  Result<std::map<int, Pose>> settle_on_earth(std::span<const Fix> fixes);
 
   bool has(FrameId frame) const { return node_of_.contains(frame); }
   const Pose& T_world_lidar(FrameId keyframe) const { return graph_.nodes()[node_of_.at(keyframe)]; }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include <revisit/simulation/internal/gps_model.hpp>
 #include <revisit/simulation/internal/imu_model.hpp>
 #include <revisit/simulation/internal/odometry_model.hpp>
 #include <revisit/simulation/internal/scanner.hpp>
@@ -35,6 +36,11 @@ std::string SimulatedRecording::kind() const {
          (parts_->options.day == 0 ? std::string() : ", day " + std::to_string(parts_->options.day));
 }
 const Trajectory& SimulatedRecording::trajectory() const { return parts_->truth; }
+Result<std::vector<GpsFix>> SimulatedRecording::gps_fixes(const std::string&) const {
+  if (!parts_->options.gps) return std::vector<GpsFix>();
+  return simulation_internal::gps_fixes(parts_->truth, parts_->options.difficulty, parts_->world.seed_of_day());
+}
+
 const Trajectory& SimulatedRecording::wheel_odometry() const { return parts_->wheels; }
 const Trajectory& SimulatedRecording::drifting_odometry() const { return parts_->drifting; }
 const SimulationOptions& SimulatedRecording::options() const { return parts_->options; }

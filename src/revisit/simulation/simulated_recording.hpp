@@ -34,6 +34,8 @@ class SimulatedRecording final : public Recording {
   const Trajectory& wheel_odometry() const;
   bool has_wheel_odometry() const override { return true; }
   std::optional<Pose> wheel_pose(std::size_t index) const override { return wheel_odometry().at(frame(index)); }
+  /// Five a second, where there is a receiver.
+  Result<std::vector<GpsFix>> gps_fixes(const std::string& topic) const override;
   /// What an IMU in the sensor reads in this part of the drive; times from `stamp_s`.
   std::vector<ImuSample> imu(double stamp_s, double from_s, double to_s) const;
   /// Six degrees of freedom, drifting away slowly.

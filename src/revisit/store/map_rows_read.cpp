@@ -114,9 +114,43 @@ Result<std::vector<CandidateRow>> MapStore::answers() const {
   return rows;
 }
 
-Result<std::size_t> MapStore::index_size() const {
+Result<std::vector<StoredFix>> MapStore::fixes() const {
+  std::vector<StoredFix> rows;
+  Statement statement = database_->prepare(
+      "SELECT f.frame,k.stamp_s,latitude_deg,longitude_deg,altitude_m,deviation_m,"
+      "f.sum=checksum(f.frame,latitude_deg,longitude_deg,altitude_m,deviation_m) FROM fixes f JOIN keyframes k ON "
+      "k.frame=f.frame ORDER BY f.frame");
+  while (statement.step()) {
+    StoredFix row{{statement.integer(0)},
+                  {statement.real(1), statement.real(2), statement.real(3), statement.real(4), {}}};
+    const auto deviation = statement.bytes(5);
+    bool is_good = statement.integer(6) != 0 && deviation.size() == 3 * sizeof(double);
+    if (is_good) std::memcpy(row.fix.deviation_m.data(), deviation.data(), deviation.size());
+    is_good = is_good && row.fix.deviation_m.allFinite() && row.fix.deviation_m.minCoeff() > 0.0 &&
+              std::abs(row.fix.latitude_deg) <= 90.0 && std::abs(row.fix.longitude_deg) <= 180.0 &&
+              std::isfinite(row.fix.altitude_m);
+    if (!is_good) return database_->damaged("fixes", row.keyframe.value);
+    rows.push_back(row);
+  }
+  if (const Status status = statement.status(); !status) return status.error();
+  return rows;
+}
+
+Result<std::vector<StoredEarth>> MapStore::earth() const {
+  std::vector<StoredEarth> rows;
   Statement statement =
-      database_->prepare("SELECT offset+length(bytes) FROM place_index ORDER BY offset DESC LIMIT 1");
+      database_->prepare("SELECT part,T_earth_map,sum=checksum(part,T_earth_map) FROM earth ORDER BY part");
+  while (statement.step()) {
+    const auto pose = to_pose(statement.bytes(1));
+    if (!pose || statement.integer(2) == 0) return database_->damaged("earth", statement.integer(0));
+    rows.push_back({static_cast<int>(statement.integer(0)), *pose});
+  }
+  if (const Status status = statement.status(); !status) return status.error();
+  return rows;
+}
+
+Result<std::size_t> MapStore::index_size() const {
+  Statement statement = database_->prepare("SELECT offset+length(bytes) FROM place_index ORDER BY offset DESC LIMIT 1");
   if (statement.step()) return static_cast<std::size_t>(statement.integer(0));
   if (const Status status = statement.status(); !status) return status.error();
   return std::size_t{0};
@@ -189,7 +223,8 @@ Status MapStore::check() const {
   if (whole.text(0) != "ok") return Error{database_->file + ": is damaged: " + whole.text(0)};
   const auto status_of = [](const auto& rows) { return rows ? ok() : Status(rows.error()); };
   for (const Status& status :
-       {status_of(sessions()), status_of(keyframes()), status_of(map_poses()), status_of(place_poses()), status_of(scans()), status_of(edges())})
+       {status_of(sessions()), status_of(keyframes()), status_of(map_poses()), status_of(place_poses()),
+        status_of(scans()), status_of(edges()), status_of(fixes()), status_of(earth())})
     if (!status) return status;
   for (const PartTable& table : kParts) {
     Statement statement = database_->prepare(table.count_damaged);

@@ -70,6 +70,32 @@ Status MapStore::add(const CandidateRow& answer) {
   return statement.bind(answer.score).bind(std::int64_t{answer.accepted}).bind(answer.reason).run();
 }
 
+Status MapStore::add(const StoredFix& fix) {
+  if (const Status begun = database_->begin(); !begun) return begun;
+  const Eigen::Vector3d& deviation_m = fix.fix.deviation_m;
+  return database_->prepare("INSERT INTO fixes VALUES(?1,?2,?3,?4,?5,checksum(?1,?2,?3,?4,?5))")
+      .bind(fix.keyframe.value)
+      .bind(fix.fix.latitude_deg)
+      .bind(fix.fix.longitude_deg)
+      .bind(fix.fix.altitude_m)
+      .bind(std::as_bytes(std::span(deviation_m.data(), 3)))
+      .run();
+}
+
+Status MapStore::set_earth(std::span<const StoredEarth> parts) {
+  if (const Status begun = database_->begin(); !begun) return begun;
+  if (const Status status = database_->run("DELETE FROM earth"); !status) return status;
+  for (const StoredEarth& each : parts) {
+    const auto pose = numbers_of(each.T_earth_map);
+    const Status status = database_->prepare("INSERT INTO earth VALUES(?1,?2,checksum(?1,?2))")
+                              .bind(std::int64_t{each.part})
+                              .bind(std::as_bytes(std::span(pose)))
+                              .run();
+    if (!status) return status;
+  }
+  return ok();
+}
+
 Status MapStore::set(const StoredSession& session) {
   if (const Status begun = database_->begin(); !begun) return begun;
   return database_->prepare("INSERT OR REPLACE INTO sessions VALUES(?1,?2,?3,?4,checksum(?1,?2,?3,?4))")

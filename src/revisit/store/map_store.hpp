@@ -11,6 +11,7 @@
 #include <vector>
 
 #include <revisit/core/candidate_row.hpp>
+#include <revisit/core/gps_fix.hpp>
 #include <revisit/core/loop.hpp>
 #include <revisit/core/pose.hpp>
 #include <revisit/core/result.hpp>
@@ -60,6 +61,18 @@ struct StoredMapPose {
   int part = 0;
 };
 
+/// Where GPS had a key frame; its stamp is the key frame's.
+struct StoredFix {
+  FrameId keyframe;
+  GpsFix fix;
+};
+
+/// How a part of the map lies on the earth: east, north and up of the map's first fix.
+struct StoredEarth {
+  int part = 0;
+  Pose T_earth_map = Pose::Identity();
+};
+
 /// A map on disk (SQLite), which grows while it is made. What was committed survives whatever happens to the program,
 /// and each row is checked against altered bytes as it is read. Belongs to one thread at a time; any number of programs
 /// may read a file while one writes it.
@@ -85,6 +98,7 @@ class MapStore {
   Status add(const StoredScan& scan);
   Status add(const StoredEdge& edge);
   Status add(const CandidateRow& answer);
+  Status add(const StoredFix& fix);
   /// Everything added since the last commit becomes part of the map, or none of it does.
   Status commit();
   /// Nothing more will be written: what was committed is brought into the one file. Without it, the destructor does so
@@ -97,6 +111,9 @@ class MapStore {
   Status set(const StoredSession& session);
   /// All of them: those of before are forgotten.
   Status set_map_poses(std::span<const StoredMapPose> poses);
+
+  /// All of them: those of before are forgotten.
+  Status set_earth(std::span<const StoredEarth> parts);
 
   /// What a finished map is opened with at once: its place index in pieces (PlaceIndex::save), which carry checksums of
   /// their own, and where the places are. Both are gone as soon as a key frame or a pose changes.
@@ -129,6 +146,9 @@ class MapStore {
   /// In the order in which they were added.
   Result<std::vector<StoredEdge>> edges() const;
   Result<std::vector<CandidateRow>> answers() const;
+  /// In the order of their key frames.
+  Result<std::vector<StoredFix>> fixes() const;
+  Result<std::vector<StoredEarth>> earth() const;
   enum class Part { kDescriptor, kPlace, kCloud };
   /// Empty where the place was known already. An unknown frame is an error.
   Result<Bytes> part(FrameId keyframe, Part part) const;

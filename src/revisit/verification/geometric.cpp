@@ -29,6 +29,13 @@ struct Refinement {
   static constexpr double kMost_m = 0.15, kMost_rad = 0.02;
 };
 
+// By how far down they see: a sensor always sees the ground at its feet.
+bool sensors_differ(const View& a, const View& b) {
+  constexpr double kRatio = 1.5;
+  const double less = std::min(-a.least_slope, -b.least_slope), more = std::max(-a.least_slope, -b.least_slope);
+  return less > 0.0 && more > kRatio * less;
+}
+
 GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& query, const CandidateView& view,
                                 const GeometricOptions& options) {
   const PairScale scale(match, query);
@@ -53,6 +60,7 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
   all.rmse_m = agreement.rmse_m;
   all.voxel_m = scale.voxel_m;
   all.least_fixed = agreement.least_fixed;
+  all.sensors_differ = sensors_differ(match.view(), query.view());
   all.inliers = agreement.inliers;
   all.overlap = view.overlap;
   all.distance_m = icp.T_target_source.translation().norm();

@@ -27,11 +27,7 @@ constexpr double kFarthest_m = 12.0, kMostShare = 1.1, kFewestInliers = 10.0;
 constexpr double kEnoughInliers = 300.0;  // fewer may fit by chance
 constexpr double kUnseenAMetre = 0.03;    // share of what fits that is out of sight, for each metre between the sensors
 
-}  // namespace
-
-double loop_log_odds(const LoopEvidence& evidence) {
-  const Scale& scale = evidence.voxel_m < Scale::kFine_m ? kFine : kCoarse;
-  const Coefficients& c = evidence.intensity_agreement ? scale.with_intensity : scale.without;
+double log_odds_by(const Coefficients& c, const LoopEvidence& evidence) {
   // Disagreement counts by its order of magnitude: one point in a hundred seen through, or three.
   const double free_space = -std::log(1.004 - std::clamp(evidence.free_space_agreement, 0.0, 1.0));
   const double in_sight = 1.0 - kUnseenAMetre * std::min(evidence.distance_m, kFarthest_m);
@@ -40,6 +36,18 @@ double loop_log_odds(const LoopEvidence& evidence) {
          c.rmse * evidence.rmse_m / evidence.voxel_m + c.least_fixed * std::sqrt(std::max(0.0, evidence.least_fixed)) +
          c.few * std::log(std::clamp(static_cast<double>(evidence.inliers), kFewestInliers, kEnoughInliers) /
                           kEnoughInliers);
+}
+
+}  // namespace
+
+double loop_log_odds(const LoopEvidence& evidence) {
+  const Scale& scale = evidence.voxel_m < Scale::kFine_m ? kFine : kCoarse;
+  if (!evidence.intensity_agreement) return log_odds_by(scale.without, evidence);
+  const double with = log_odds_by(scale.with_intensity, evidence);
+  if (!evidence.sensors_differ) return with;
+  // Intensities of two sensors are comparable or not, as likely one as the other: the mean of both odds.
+  const double without = log_odds_by(scale.without, evidence), more = std::max(with, without);
+  return more + std::log(0.5 * (std::exp(with - more) + std::exp(without - more)));
 }
 
 double probability_of(double log_odds) { return 1.0 / (1.0 + std::exp(-log_odds)); }

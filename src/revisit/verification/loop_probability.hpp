@@ -20,7 +20,8 @@ struct LoopEvidence {
   double overlap = 0.0;      ///< of both scans seen from overhead
   double least_fixed = 0.0;  ///< how well the surfaces fix the direction that they fix least (Agreement): a slide
   std::size_t inliers = 0;   ///< points, smaller of both directions
-  double distance_m = 0.0;   ///< between both sensors: farther apart, less fits even at the same place
+  bool sensors_differ = false;  ///< in what they can see; what their intensities have in common is not known then
+  double distance_m = 0.0;      ///< between both sensors: farther apart, less fits even at the same place
 };
 
 /// The log odds that the pose is right (within 0.5 m and 3 degrees), were right and wrong ones equally many: a logistic

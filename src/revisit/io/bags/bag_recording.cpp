@@ -2,6 +2,8 @@
 #include <revisit/io/internal/bag_recording.hpp>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 
 #include <revisit/io/internal/bytes.hpp>
 #include <revisit/io/internal/remarks.hpp>
@@ -56,6 +58,28 @@ class BagRecording final : public Recording {
     return to_trajectory(poses, std::nullopt, {{frame(index), *stamp}}).at(frame(index));
   }
 
+  Result<std::vector<GpsFix>> gps_fixes(const std::string& name) const override {
+    std::vector<std::size_t> topics;
+    for (std::size_t i = 0; i < bag_->topics().size(); ++i) {
+      const BagTopic& topic = bag_->topics()[i];
+      if (topic.type == "sensor_msgs/NavSatFix" && (name.empty() || topic.name == name)) topics.push_back(i);
+    }
+    if (topics.empty() && !name.empty())
+      return Error{bag_->path().string() + ": has no topic " + name + " of GPS (sensor_msgs/NavSatFix)"};
+    if (topics.size() > 1) return Error{bag_->path().string() + ": has several topics of GPS; name one"};
+    std::vector<GpsFix> fixes;
+    if (topics.empty()) return fixes;
+    const Status read = bag_->visit(topics[0], INT64_MIN, INT64_MAX, [&](const BagMessage& message) {
+      if (const auto values = bag_->decode(topics[0], message))
+        if (const auto fix = to_fix(*values)) fixes.push_back(*fix);
+      return true;
+    });
+    if (!read && fixes.empty()) return read.error();
+    std::stable_sort(fixes.begin(), fixes.end(),
+                     [](const GpsFix& a, const GpsFix& b) { return a.stamp_s < b.stamp_s; });
+    return fixes;
+  }
+
   std::vector<std::string> findings() const override {
     std::vector<std::string> lines = scans_->findings();
     if (choice_.odometry) lines.push_back("odometry: " + bag_->topics()[*choice_.odometry].name);
@@ -64,6 +88,26 @@ class BagRecording final : public Recording {
   }
 
  private:
+  // Nothing where the receiver had no fix.
+  static std::optional<GpsFix> to_fix(const MessageValues& values) {
+    constexpr double kUnknown_m = 3.0, kLeast_m = 1e-3, kNone_m = 1e4;
+    const auto at = [&](const char* path) { return values.number(path).value_or(std::nan("")); };
+    GpsFix fix{to_seconds(values.stamp_ns()), at("latitude"), at("longitude"), at("altitude"), {}};
+    const bool is_fix = values.integer("status.status").value_or(-1) >= 0;
+    if (!is_fix || !(std::abs(fix.latitude_deg) <= 90.0) || !(std::abs(fix.longitude_deg) <= 180.0))
+      return std::nullopt;
+    const bool has_altitude = std::isfinite(fix.altitude_m);
+    if (!has_altitude) fix.altitude_m = 0.0;
+    const bool is_known = values.integer("position_covariance_type").value_or(0) > 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double variance = values.number("position_covariance", static_cast<std::size_t>(4 * axis)).value_or(0.0);
+      const double unknown = axis == 2 ? 1.7 * kUnknown_m : kUnknown_m;
+      fix.deviation_m[axis] = is_known && variance > 0.0 ? std::max(kLeast_m, std::sqrt(variance)) : unknown;
+    }
+    if (!has_altitude) fix.deviation_m.z() = kNone_m;
+    return fix;
+  }
+
   // Other messages of that moment were recorded when they came, the scan perhaps only after it was filtered.
   static std::pair<double, double> recorded_between(double log_time_s, double stamp_s) {
     constexpr double kSameClock_s = 10.0;

@@ -112,6 +112,17 @@ Status BagWriter::write_imu(const std::string& topic, const std::string& frame_i
   return write(topic, "sensor_msgs/Imu", time_ns, message.bytes());
 }
 
+Status BagWriter::write_fix(const std::string& topic, const std::string& frame_id, const GpsFix& fix) {
+  MessageWriter message(file_->serialisation());
+  message.header(to_nanoseconds(fix.stamp_s), frame_id);
+  message.number(std::int8_t{0});    // status: a fix
+  message.number(std::uint16_t{1});  // service: GPS
+  for (const double value : {fix.latitude_deg, fix.longitude_deg, fix.altitude_m}) message.number(value);
+  for (int i = 0; i < 9; ++i) message.number(i % 4 == 0 ? std::pow(fix.deviation_m[i / 4], 2) : 0.0);
+  message.number(std::uint8_t{2});  // type of covariance: its diagonal is known
+  return write(topic, "sensor_msgs/NavSatFix", to_nanoseconds(fix.stamp_s), message.bytes());
+}
+
 Status BagWriter::write_odometry(const std::string& topic, const std::string& frame_id,
                                  const std::string& child_frame_id, double stamp_s, const Pose& T_frame_child) {
   MessageWriter message(file_->serialisation());
@@ -158,6 +169,7 @@ std::string md5_of(const std::string& type) {
   static const std::map<std::string, std::string> kSums = {
       {"sensor_msgs/PointCloud2", "1158d486dd51d683ce2f1be655c3c181"},
       {"sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2"},
+      {"sensor_msgs/NavSatFix", "2d3a8cd499b9b4a0249fb98fd05cfa48"},
       {"nav_msgs/Odometry", "cd5e73d190d741a2f92e81eda573aca7"},
       {"tf2_msgs/TFMessage", "94810edda583a504dfda3829e70d7eec"}};
   const auto found = kSums.find(type);

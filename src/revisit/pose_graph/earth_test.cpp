@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/pose_graph/earth.hpp>
+
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace revisit {
+namespace {
+
+Pose at(double x, double y, double yaw_rad) {
+  Pose T = Pose::Identity();
+  T.translate(Eigen::Vector3d(x, y, 0.0));
+  T.rotate(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()));
+  return T;
+}
+
+// A way of 600 m with two bends, measured with an odometry whose heading drifts.
+struct Drive {
+  std::vector<Pose> truth;
+  PoseGraph graph;
+  std::vector<int> parts;
+
+  explicit Drive(double drift_rad = 4e-4) {
+    Pose T = Pose::Identity(), believed = Pose::Identity();
+    Matrix6 information = Matrix6::Identity();
+    information.diagonal() << 400, 400, 400, 1e5, 1e5, 1e5;
+    for (int i = 0; i < 300; ++i) {
+      truth.push_back(T);
+      parts.push_back(0);
+      graph.add_node(believed);
+      const Pose step = at(2.0, 0.0, i % 100 > 80 ? 0.05 : 0.0), measured = step * at(0.0, 0.0, drift_rad);
+      if (i > 0) graph.add_edge({static_cast<std::size_t>(i - 1), static_cast<std::size_t>(i), last, information});
+      last = measured;
+      T = T * step;
+      believed = believed * measured;
+    }
+  }
+  double worst_m(const Pose& T_truth_world) const {
+    double worst = 0.0;
+    for (std::size_t i = 0; i < truth.size(); ++i)
+      worst = std::max(worst, (truth[i].translation() - T_truth_world * graph.nodes()[i].translation()).norm());
+    return worst;
+  }
+  Pose last = Pose::Identity();
+};
+
+// Where the receiver is on the earth: turned, far off, with jumps.
+std::vector<EarthFix> fixes(const Drive& drive, const Pose& T_earth_truth, int jumps) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0.0, 0.5);
+  std::vector<EarthFix> all;
+  for (std::size_t i = 0; i < drive.truth.size(); i += 5) {
+    Eigen::Vector3d p =
+        T_earth_truth * drive.truth[i].translation() + Eigen::Vector3d(noise(random), noise(random), noise(random));
+    if (static_cast<int>(all.size()) % 10 < jumps) p += Eigen::Vector3d(30.0, -20.0, 10.0);
+    all.push_back({i, p, Eigen::Vector3d::Constant(0.5)});
+  }
+  return all;
+}
+
+TEST(Earth, FixesUndoDriftAndTellHowTheMapLies) {
+  const Pose T_earth_truth = at(4000.0, -700.0, 2.0);
+  for (const int jumps : {0, 2}) {
+    Drive drive;
+    ASSERT_GT(drive.worst_m(Pose::Identity()), 15.0);
+    const auto placed = settle_on_earth(drive.graph, fixes(drive, T_earth_truth, jumps), drive.parts);
+    ASSERT_TRUE(placed) << placed.error().message;
+    ASSERT_TRUE((*placed)[0]);
+    EXPECT_LT(drive.worst_m(T_earth_truth.inverse() * *(*placed)[0]), 1.5) << jumps << " of 10 are jumps";
+  }
+}
+
+// Too few, or all at one place: nothing is moved.
+TEST(Earth, FewFixesPlaceNothing) {
+  Drive drive;
+  const std::vector<Pose> before = drive.graph.nodes();
+  auto all = fixes(drive, at(0, 0, 1.0), 0);
+  all.resize(3);
+  const auto few = settle_on_earth(drive.graph, all, drive.parts);
+  ASSERT_TRUE(few);
+  EXPECT_FALSE((*few)[0]);
+  for (std::size_t i = 0; i < before.size(); ++i)
+    EXPECT_LT((before[i].translation() - drive.graph.nodes()[i].translation()).norm(), 0.01);
+  std::vector<EarthFix> together;
+  for (std::size_t i = 0; i < 5; ++i) together.push_back({0, Eigen::Vector3d(0.1, 0.2, 0.0), Eigen::Vector3d::Ones()});
+  const auto placed = settle_on_earth(drive.graph, together, drive.parts);
+  ASSERT_TRUE(placed);
+  EXPECT_FALSE((*placed)[0]);
+}
+
+// Parts that nothing joins lie on the earth each by its own fixes.
+TEST(Earth, PartsArePlacedEachByItsOwnFixes) {
+  Drive drive(0.0);
+  for (std::size_t i = 150; i < 300; ++i) drive.parts[i] = 1;
+  const auto placed = settle_on_earth(drive.graph, fixes(drive, at(50.0, 0.0, 0.5), 0), drive.parts);
+  ASSERT_TRUE(placed);
+  ASSERT_TRUE((*placed)[0] && (*placed)[1]);
+  EXPECT_NEAR(yaw_of(*(*placed)[0]), 0.5, 0.02);
+  EXPECT_NEAR(yaw_of(*(*placed)[1]), 0.5, 0.02);
+}
+
+}  // namespace
+}  // namespace revisit
