@@ -29,11 +29,21 @@ struct Refinement {
   static constexpr double kMost_m = 0.15, kMost_rad = 0.02;
 };
 
-// By how far down they see: a sensor always sees the ground at its feet.
+// Two sensors that see another part of a place each: by how far down they see, for the ground at its feet a sensor
+// always sees, and by how far up.
+struct Differing {
+  static constexpr double kDown = 1.5, kDownALittle = 1.15, kUp = 3.0;  ///< ratios of slopes
+  /// Of what fits between two scans of one sensor: each thins what it sees by where its own lines lie.
+  static constexpr double kShare = 0.8;
+};
+
 bool sensors_differ(const View& a, const View& b) {
-  constexpr double kRatio = 1.5;
-  const double less = std::min(-a.least_slope, -b.least_slope), more = std::max(-a.least_slope, -b.least_slope);
-  return less > 0.0 && more > kRatio * less;
+  const auto ratio = [](double x, double y) {
+    const double less = std::min(x, y), more = std::max(x, y);
+    return less > 0.0 ? more / less : 1.0;
+  };
+  const double down = ratio(-a.least_slope, -b.least_slope), up = ratio(a.greatest_slope, b.greatest_slope);
+  return down > Differing::kDown || (down > Differing::kDownALittle && up > Differing::kUp);
 }
 
 GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& query, const CandidateView& view,
@@ -53,14 +63,15 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
   evidence.information = icp.information;
   LoopEvidence& all = evidence.evidence;
   all.inlier_ratio = agreement.inlier_ratio;
-  all.inlier_share = agreement.inlier_ratio / view.typical.inlier_ratio;
+  all.sensors_differ = sensors_differ(match.view(), query.view());
+  all.inlier_share =
+      agreement.inlier_ratio / (view.typical.inlier_ratio * (all.sensors_differ ? Differing::kShare : 1.0));
   all.free_space_agreement = agreement.free_space_agreement;
   if (agreement.intensity_correlation)
     all.intensity_agreement = *agreement.intensity_correlation / view.typical.intensity_correlation;
   all.rmse_m = agreement.rmse_m;
   all.voxel_m = scale.voxel_m;
   all.least_fixed = agreement.least_fixed;
-  all.sensors_differ = sensors_differ(match.view(), query.view());
   all.inliers = agreement.inliers;
   all.overlap = view.overlap;
   all.distance_m = icp.T_target_source.translation().norm();
