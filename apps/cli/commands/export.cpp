@@ -4,6 +4,7 @@
 #include <iostream>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 
 #include <revisit/core/text.hpp>
@@ -25,6 +26,7 @@ namespace fs = std::filesystem;
 struct ExportOptions {
   std::string map, out, as;
   int part = 0;
+  std::optional<int> after_session;
   bool utm = false;
   OccupancyGrid::Options grid;
   ParameterFlags parameters;
@@ -68,13 +70,13 @@ Status put_on_earth(const SavedMap& map, const ExportOptions& options, Part& par
   return json ? ok() : Status(Error{file.string() + ": cannot be written"});
 }
 
-Result<Part> find_part(const SavedMap& map, int number) {
+Result<Part> find_part(const SavedMap& map, int number, std::optional<int> after_session) {
   Part part;
   std::set<int> others;
   for (const auto& each : map.stored().keyframes) {
     const FrameId frame = each.frame.frame;
     others.insert(map.part(frame));
-    if (map.part(frame) != number) continue;
+    if (map.part(frame) != number || (after_session && session_of(frame) > *after_session)) continue;
     part.frames.push_back(frame);
     part.poses.push_back(map.T_map_lidar(frame));
   }
@@ -86,7 +88,8 @@ Result<Part> find_part(const SavedMap& map, int number) {
 
 Status export_points(const SavedMap& map, const Part& part, const ExportOptions& options, double voxel_m) {
   const MapStore& store = *map.store();
-  const MapInput input{part.poses, [&](std::size_t i) { return read_map_points(store, part.frames[i]); }};
+  const MapInput input{part.poses,
+                       [&](std::size_t i) { return read_map_points(store, part.frames[i], options.after_session); }};
   MapOptions how{.voxel_m = voxel_m, .formats = {}, .las_offset_m = part.offset_m};
   if (options.as == "ply") how.formats = {CloudFormat::kPly};
   if (options.as == "pcd") how.formats = {CloudFormat::kPcd};
@@ -121,7 +124,7 @@ Status export_grid(const SavedMap& map, const Part& part, const ExportOptions& o
   Progress progress("export", "key frames", part.frames.size());
   for (std::size_t i = 0; i < part.frames.size(); ++i) {
     if (interrupted()) return Error{"interrupted; nothing was written"};
-    const auto points = read_map_points(*map.store(), part.frames[i]);
+    const auto points = read_map_points(*map.store(), part.frames[i], options.after_session);
     if (!points) return points.error();
     const auto bytes = map.store()->part(part.frames[i], MapStore::Part::kPlace);
     if (!bytes) return bytes.error();
@@ -161,7 +164,7 @@ int run_export(const ExportOptions& options) {
   if (!parameters) return fail(parameters.error(), kUsage);
   const auto map = SavedMap::open(options.map);
   if (!map) return fail(map.error());
-  auto part = find_part(*map, options.part);
+  auto part = find_part(*map, options.part, options.after_session);
   if (!part) return fail({options.map + ": " + part.error().message});
   std::error_code failure;
   fs::create_directories(options.out, failure);
@@ -196,6 +199,10 @@ Run add_export(CLI::App& program) {
       ->check(CLI::IsMember({"ply", "pcd", "las", "tiles", "grid", "tum", "g2o"}));
   command->add_option("--out", options->out, "Folder for the files")->required();
   command->add_option("--part", options->part, "Of a map whose sessions are not all joined: which part (see info)");
+  command->add_option(
+      "--after-session", options->after_session,
+      "Points and grid as the map was after this session: with what was gone later, and without what was "
+      "new (default: as it is now)");
   command->add_flag("--utm", options->utm,
                     "Of a map made with --gps: in the UTM zone that it lies in, heights above the ellipsoid; utm.json "
                     "names the zone, and what is to be added to the points of ply, pcd and tiles");

@@ -2,6 +2,7 @@
 // Several sessions in one map: added one after the other, or merged.
 #include <fstream>
 #include <functional>
+#include <map>
 
 #include <gtest/gtest.h>
 
@@ -109,6 +110,36 @@ TEST(MapSessions, AnInterruptedSessionGoesOn) {
   scan.frame = FrameId{1};
   scan.stamp_s = 0.1;
   EXPECT_TRUE(slam->process(std::move(scan)));
+}
+
+// What visits of known ground leave is put away when the next session begins; the map stays whole and where it was.
+TEST(MapSessions, KnownGroundAddsNothingForGood) {
+  const fs::path folder = fresh_folder();
+  (void)drive(folder, there, 61);
+  std::size_t keyframes_of_first = 0, keyframes_before = 0;
+  for (int session = 1; session <= 4; ++session) {
+    const auto visit = drive(folder, session % 2 == 1 ? PoseOf(back) : PoseOf(there), 61, true);
+    ASSERT_TRUE(visit);
+    EXPECT_TRUE(visit->is_joined()) << session;
+    EXPECT_EQ(visit->store().visits()->size(), 0u) << "compared, then forgotten";
+    std::map<int, std::size_t> keyframes;
+    for (const FrameId frame : visit->graph().keyframes()) ++keyframes[session_of(frame)];
+    if (session == 1) keyframes_of_first = keyframes[0];
+    EXPECT_EQ(keyframes[0], keyframes_of_first) << "the first session keeps all it has";
+    std::size_t of_earlier = 0;
+    for (int earlier = 1; earlier < session; ++earlier) of_earlier += keyframes[earlier];
+    EXPECT_LE(of_earlier, keyframes_of_first / 3) << "after session " << session;
+    if (session >= 3) {
+      EXPECT_LE(visit->graph().keyframes().size(), keyframes_before + keyframes_of_first / 5);
+    }
+    keyframes_before = visit->graph().keyframes().size();
+    EXPECT_EQ(visit->trajectories()->corrected.entries.size(), std::size_t{kSessionScans});
+  }
+  const auto map = SavedMap::open(folder);
+  ASSERT_TRUE(map) << map.error().message;
+  EXPECT_TRUE(map->store()->check());
+  EXPECT_EQ(map->stored().sessions.size(), 5u);
+  EXPECT_LT(off_m(*map, 0, there, 4, there), 0.3);
 }
 
 TEST(MapSessions, AnotherPlaceWaitsBesideTheMap) {

@@ -5,6 +5,7 @@
 
 #include <revisit/core/stopwatch.hpp>
 #include <revisit/core/text.hpp>
+#include <revisit/pipeline/map_upkeep.hpp>
 #include <revisit/store/keyframe_bytes.hpp>
 
 namespace revisit {
@@ -46,8 +47,14 @@ Result<Slam> Slam::open(std::shared_ptr<MapStore> store, const Parameters& param
 }
 
 Status Slam::restore(const SlamSetup& setup) {
-  const auto map = read_map(*store_);
+  auto map = read_map(*store_);
   if (!map) return map.error();
+  if (setup.new_session) {
+    const auto removed = remove_known_ground(*store_, *map);
+    if (!removed) return removed.error();
+    if (*removed) map = read_map(*store_);
+    if (!map) return map.error();
+  }
   StoredSession session{0, setup.recording, setup.parameters, {}};
   const bool continues = !map->sessions.empty() && !setup.new_session;
   if (continues)

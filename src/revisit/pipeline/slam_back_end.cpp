@@ -11,6 +11,7 @@
 #include <revisit/core/stopwatch.hpp>
 #include <revisit/core/text.hpp>
 #include <revisit/mapping/earth_frame.hpp>
+#include <revisit/pipeline/map_upkeep.hpp>
 #include <revisit/pose_graph/edge_information.hpp>
 #include <revisit/store/keyframe_bytes.hpp>
 #include <revisit/store/stored_clouds.hpp>
@@ -88,13 +89,16 @@ Status SlamBackEnd::enter_keyframe(Entry entry, Result<Detection> detection, Add
   added.graph_ms += watch.lap_ms();
 
   StoredKeyframe& row = entry.row;
+  Bytes visit;
   if (is_known_place) {
+    if (session_.id > 0) visit = std::move(row.cloud);
     row.descriptor = row.place = row.cloud = {};
   } else if (row.descriptor.empty()) {
     row.descriptor = to_bytes(entry.place->descriptor);
     row.place = to_bytes(entry.place->cloud);
   }
   Status stored = store_->add(row);
+  if (stored && !visit.empty()) stored = store_->add_visit(frame, visit);
   if (stored && edge) stored = store_->add(*edge);
   if (stored && detection && detection->searchable_places > 0) stored = store_->add(detection->row());
   if (std::string facts = to_text(facts_); stored && facts != session_.sensor) {
@@ -195,6 +199,7 @@ Status SlamBackEnd::settle_session() {
   std::size_t entered = 0;
   if (Status stored = enter(graph_.decide_all(), entered); !stored) return stored;
   if (Status settled = graph_.settle(); !settled) return settled;
+  if (Status compared = compare_with_visits(*store_, graph_, session_.id); !compared) return compared;
   for (const StoredMapPose& each : poses_of_places())
     recognition_.set_point(each.keyframe, point_in_map(each.T_map_lidar, each.part));
   return ok();
@@ -205,9 +210,10 @@ Status SlamBackEnd::finish() {
   const Status stored = enter(graph_.decide_all(), entered);
   const Status settled = settle_all();
   const Status placed = stored && settled ? write_map_poses() : ok();
+  const Status compared = stored && settled ? compare_with_visits(*store_, graph_, session_.id) : ok();
   const Status learnt = stored && settled ? learn_look_alikes() : ok();
   const Status committed = store_->commit();
-  for (const Status* each : {&stored, &settled, &placed, &learnt})
+  for (const Status* each : {&stored, &settled, &placed, &compared, &learnt})
     if (!*each) return *each;
   return committed;
 }

@@ -48,6 +48,21 @@ Matrix6 external_odometry_information(const Pose& T_from_to) {
 
 Matrix6 loop_information(const Matrix6& registration) { return with_least(Trust::loop(), registration); }
 
+// To first order: the error of the first motion as it is seen after the second one, and the second one's own.
+Matrix6 chained_information(const Matrix6& of_ab, const Matrix6& of_bc, const Pose& T_b_c) {
+  const Eigen::Matrix3d R = T_b_c.linear().transpose();
+  const Eigen::Vector3d t = T_b_c.translation();
+  Eigen::Matrix3d cross;
+  cross << 0.0, -t.z(), t.y(), t.z(), 0.0, -t.x(), -t.y(), t.x(), 0.0;
+  Matrix6 seen_from_c = Matrix6::Zero();
+  seen_from_c.topLeftCorner<3, 3>() = R;
+  seen_from_c.topRightCorner<3, 3>() = -R * cross;
+  seen_from_c.bottomRightCorner<3, 3>() = R;
+  const Matrix6 covariance = seen_from_c * of_ab.inverse() * seen_from_c.transpose() + of_bc.inverse();
+  const Matrix6 information = covariance.inverse();
+  return 0.5 * (information + information.transpose());
+}
+
 Matrix6 no_information() { return covariance_of(Trust::kUnmeasured).inverse(); }
 
 }  // namespace revisit

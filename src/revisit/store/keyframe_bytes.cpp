@@ -69,8 +69,17 @@ class Reader {
 };
 
 using Position = std::array<float, 3>;
-constexpr std::size_t kMapPointBytes = 7;
+constexpr std::size_t kMapPointBytes = 7, kChangeBytes = 5;
 constexpr float kMost_cm = 32767.f, kIntensitySteps = 255.f;
+
+// False where a point is too far out for its numbers.
+bool put_map_point(Writer& writer, const Point& p) {
+  const Eigen::Vector3f p_cm = 100.f * Eigen::Vector3f(p.x, p.y, p.z);
+  if (p_cm.cwiseAbs().maxCoeff() > kMost_cm) return false;
+  for (int axis = 0; axis < 3; ++axis) writer.put(static_cast<std::int16_t>(std::lround(p_cm[axis])));
+  writer.put(static_cast<std::uint8_t>(std::lround(kIntensitySteps * std::clamp(p.intensity, 0.f, 1.f))));
+  return true;
+}
 
 }  // namespace
 
@@ -133,10 +142,8 @@ std::optional<ThinCloud> to_thin_cloud(std::span<const std::byte> bytes) {
 Bytes to_map_bytes(const ThinCloud& cloud) {
   Writer writer;
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
-    const Eigen::Vector3f p_cm = 100.f * cloud.points[i];
-    if (p_cm.cwiseAbs().maxCoeff() > kMost_cm) continue;
-    for (int axis = 0; axis < 3; ++axis) writer.put(static_cast<std::int16_t>(std::lround(p_cm[axis])));
-    writer.put(static_cast<std::uint8_t>(std::lround(kIntensitySteps * std::clamp(cloud.intensity[i], 0.f, 1.f))));
+    const Eigen::Vector3f& p = cloud.points[i];
+    (void)put_map_point(writer, {p.x(), p.y(), p.z(), cloud.intensity[i]});
   }
   return writer.take();
 }
@@ -152,12 +159,52 @@ std::optional<std::vector<Point>> to_map_points(std::span<const std::byte> bytes
   return points;
 }
 
-Result<std::vector<Point>> read_map_points(const MapStore& store, FrameId keyframe) {
-  const auto bytes = store.part(keyframe, MapStore::Part::kCloud);
-  if (!bytes) return bytes.error();
-  auto points = to_map_points(*bytes);
+Result<StoredPlacePoints> read_place_points(const MapStore& store, FrameId keyframe) {
+  const auto cloud = store.part(keyframe, MapStore::Part::kCloud);
+  if (!cloud) return cloud.error();
+  auto points = to_map_points(*cloud);
   if (!points) return store.damaged("cloud", keyframe);
-  return *std::move(points);
+  StoredPlacePoints result{*std::move(points), {}, session_of(keyframe)};
+  const auto changes = store.part(keyframe, MapStore::Part::kChanges);
+  if (!changes) return changes.error();
+  const auto own = static_cast<std::uint16_t>(session_of(keyframe));
+  result.history.assign(result.points.size(), PointHistory{own, PointHistory::kNever, 0});
+  if (changes->empty()) return result;
+  if (changes->size() != sizeof(std::int32_t) + result.points.size() * kChangeBytes)
+    return store.damaged("changes", keyframe);
+  Reader reader(*changes);
+  result.compared_with = reader.get<std::int32_t>();
+  for (PointHistory& each : result.history) {
+    each.since = reader.get<std::uint16_t>();
+    each.gone = reader.get<std::uint16_t>();
+    each.missed = reader.get<std::uint8_t>();
+  }
+  return result;
+}
+
+Status write_place_points(MapStore& store, FrameId keyframe, const StoredPlacePoints& points) {
+  Writer cloud, changes;
+  changes.put(static_cast<std::int32_t>(points.compared_with));
+  for (std::size_t i = 0; i < points.points.size(); ++i) {
+    if (!put_map_point(cloud, points.points[i])) continue;
+    const PointHistory& history = points.history[i];
+    changes.put(history.since);
+    changes.put(history.gone);
+    changes.put(history.missed);
+  }
+  return store.set_cloud(keyframe, cloud.take(), changes.take());
+}
+
+Result<std::vector<Point>> read_map_points(const MapStore& store, FrameId keyframe, std::optional<int> after_session) {
+  auto all = read_place_points(store, keyframe);
+  if (!all) return all.error();
+  std::vector<Point> points;
+  points.reserve(all->points.size());
+  for (std::size_t i = 0; i < all->points.size(); ++i) {
+    const PointHistory& history = all->history[i];
+    if (after_session ? history.was_in_map(*after_session) : history.is_in_map()) points.push_back(all->points[i]);
+  }
+  return points;
 }
 
 }  // namespace revisit

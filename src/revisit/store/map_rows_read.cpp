@@ -193,13 +193,17 @@ struct PartTable {
   const char* select;
   const char* count_damaged;
 };
-constexpr std::array<PartTable, 3> kParts = {
+constexpr std::array<PartTable, 5> kParts = {
     {{"descriptor", "SELECT bytes,sum=checksum(frame,bytes) FROM descriptors WHERE frame=?",
       "SELECT frame FROM descriptors WHERE sum<>checksum(frame,bytes) LIMIT 1"},
      {"place", "SELECT bytes,sum=checksum(frame,bytes) FROM places WHERE frame=?",
       "SELECT frame FROM places WHERE sum<>checksum(frame,bytes) LIMIT 1"},
      {"cloud", "SELECT bytes,sum=checksum(frame,bytes) FROM clouds WHERE frame=?",
-      "SELECT frame FROM clouds WHERE sum<>checksum(frame,bytes) LIMIT 1"}}};
+      "SELECT frame FROM clouds WHERE sum<>checksum(frame,bytes) LIMIT 1"},
+     {"visit", "SELECT bytes,sum=checksum(frame,bytes) FROM visits WHERE frame=?",
+      "SELECT frame FROM visits WHERE sum<>checksum(frame,bytes) LIMIT 1"},
+     {"changes", "SELECT bytes,sum=checksum(frame,bytes) FROM changes WHERE frame=?",
+      "SELECT frame FROM changes WHERE sum<>checksum(frame,bytes) LIMIT 1"}}};
 
 }  // namespace
 
@@ -215,6 +219,25 @@ Result<Bytes> MapStore::part(FrameId keyframe, Part part) const {
   Statement known = database_->prepare("SELECT 1 FROM keyframes WHERE frame=?");
   if (known.bind(keyframe.value).step()) return Bytes();
   return Error{database_->file + ": has no key " + to_text(keyframe)};
+}
+
+namespace {
+
+Result<std::vector<FrameId>> frames_of(Statement statement) {
+  std::vector<FrameId> frames;
+  while (statement.step()) frames.push_back({statement.integer(0)});
+  if (const Status status = statement.status(); !status) return status.error();
+  return frames;
+}
+
+}  // namespace
+
+Result<std::vector<FrameId>> MapStore::visits() const {
+  return frames_of(database_->prepare("SELECT frame FROM visits ORDER BY frame"));
+}
+
+Result<std::vector<FrameId>> MapStore::places() const {
+  return frames_of(database_->prepare("SELECT frame FROM descriptors ORDER BY frame"));
 }
 
 Status MapStore::check() const {

@@ -32,6 +32,53 @@ Status MapStore::add(const StoredKeyframe& keyframe) {
   return ok();
 }
 
+Status MapStore::add_visit(FrameId keyframe, const Bytes& cloud) {
+  if (const Status begun = database_->begin(); !begun) return begun;
+  return database_->prepare("INSERT INTO visits VALUES(?1,?2,checksum(?1,?2))").bind(keyframe.value).bind(cloud).run();
+}
+
+Status MapStore::set_cloud(FrameId keyframe, const Bytes& cloud, const Bytes& changes) {
+  if (const Status begun = database_->begin(); !begun) return begun;
+  for (const auto& [sql, bytes] : {std::pair{"INSERT OR REPLACE INTO clouds VALUES(?1,?2,checksum(?1,?2))", &cloud},
+                                   {"INSERT OR REPLACE INTO changes VALUES(?1,?2,checksum(?1,?2))", &changes}})
+    if (const Status status = database_->prepare(sql).bind(keyframe.value).bind(*bytes).run(); !status) return status;
+  return ok();
+}
+
+Status MapStore::forget_visits() {
+  if (const Status begun = database_->begin(); !begun) return begun;
+  return database_->run("DELETE FROM visits");
+}
+
+Status MapStore::remove(std::span<const FrameId> keyframes, std::span<const Joint> joints) {
+  if (const Status begun = database_->begin(); !begun) return begun;
+  if (const Status dropped = database_->drop_index(); !dropped) return dropped;
+  for (const char* sql :
+       {"DELETE FROM keyframes WHERE frame=?1", "DELETE FROM map_poses WHERE frame=?1",
+        "DELETE FROM fixes WHERE frame=?1", "DELETE FROM scans WHERE keyframe=?1", "DELETE FROM answers WHERE query=?1",
+        "DELETE FROM descriptors WHERE frame=?1", "DELETE FROM places WHERE frame=?1",
+        "DELETE FROM clouds WHERE frame=?1", "DELETE FROM changes WHERE frame=?1",
+        "DELETE FROM edges WHERE from_frame=?1 OR to_frame=?1"}) {
+    Statement statement = database_->prepare(sql);
+    for (const FrameId frame : keyframes) {
+      if (const Status status = statement.bind(frame.value).run(); !status) return status;
+      statement.reset();
+    }
+  }
+  for (const Joint& each : joints) {
+    if (const Status status = add(each.edge); !status) return status;
+    if (!each.starts_segment) continue;
+    const Status status = database_
+                              ->prepare(
+                                  "UPDATE keyframes SET starts_anew=1,sum=checksum(frame,stamp_s,T_odom_lidar,1) "
+                                  "WHERE frame=?")
+                              .bind(each.edge.to.value)
+                              .run();
+    if (!status) return status;
+  }
+  return ok();
+}
+
 Status MapStore::add(const StoredScan& scan) {
   if (const Status begun = database_->begin(); !begun) return begun;
   const auto from_keyframe = numbers_of(scan.T_keyframe_lidar), from_odom = numbers_of(scan.T_odom_lidar);

@@ -27,6 +27,8 @@ Result<MapStore> MapStore::create(const std::filesystem::path& file) {
   if (!file.empty() && std::filesystem::exists(file, failure)) return Error{file.string() + ": exists already"};
   auto database = Database::connect(file, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
   if (!database) return database.error();
+  // What is taken out makes room for what comes, and goes back to the system at the end.
+  if (const Status status = (*database)->run("PRAGMA auto_vacuum=INCREMENTAL"); !status) return status.error();
   if (const Status status = (*database)->journal(); !status) return status.error();
   if (const Status status = store_internal::create_schema((*database)->handle.get(), file.string()); !status)
     return status.error();

@@ -101,6 +101,22 @@ class MapStore {
   Status add(const StoredFix& fix);
   /// Everything added since the last commit becomes part of the map, or none of it does.
   Status commit();
+  /// Of a key frame at a place that was known: what it saw, until the session is finished.
+  Status add_visit(FrameId keyframe, const Bytes& cloud);
+  /// The points of a place with what later sessions made of them. Empty `changes`: nothing.
+  Status set_cloud(FrameId keyframe, const Bytes& cloud, const Bytes& changes);
+  Status forget_visits();
+  /// Key frames of the session that visited known places, in order.
+  Result<std::vector<FrameId>> visits() const;
+  /// Takes key frames out of the map, with all that belongs to them. `joints` join those that stay.
+  struct Joint {
+    StoredEdge edge;
+    bool starts_segment = false;  ///< as of the key frame that it leads to
+  };
+  Status remove(std::span<const FrameId> keyframes, std::span<const Joint> joints);
+  /// Key frames that are places, in order.
+  Result<std::vector<FrameId>> places() const;
+
   /// Nothing more will be written: what was committed is brought into the one file. Without it, the destructor does so
   /// as far as it can.
   Status close();
@@ -149,7 +165,7 @@ class MapStore {
   /// In the order of their key frames.
   Result<std::vector<StoredFix>> fixes() const;
   Result<std::vector<StoredEarth>> earth() const;
-  enum class Part { kDescriptor, kPlace, kCloud };
+  enum class Part { kDescriptor, kPlace, kCloud, kVisit, kChanges };
   /// Empty where the place was known already. An unknown frame is an error.
   Result<Bytes> part(FrameId keyframe, Part part) const;
   /// Reads everything: an error names the first row that is not what was written.

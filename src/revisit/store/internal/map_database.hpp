@@ -59,6 +59,8 @@ struct MapStore::Database {
   Status end_writing() {
     if (!handle || !std::exchange(writes, false)) return ok();
     if (is_in_transaction()) (void)run("ROLLBACK");
+    // Each step gives a page back.
+    for (store_internal::Statement vacuum = prepare("PRAGMA incremental_vacuum"); vacuum.step();) continue;
     if (const Status status = run("PRAGMA wal_checkpoint(TRUNCATE)"); !status) return status;
     return run("PRAGMA journal_mode=DELETE");
   }

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <revisit/core/point_history.hpp>
+#include <revisit/core/pose.hpp>
+#include <revisit/core/scan.hpp>
+
+namespace revisit {
+
+/// The points of a place, in its frame, with the history of each.
+struct PlacePoints {
+  Pose T_map_lidar = Pose::Identity();
+  std::vector<Point> points;
+  std::vector<PointHistory> history;
+};
+
+/// What a session saw from a key frame, in its frame.
+struct Visit {
+  Pose T_map_lidar = Pose::Identity();
+  std::vector<Point> points;
+};
+
+/// Visits after which what they saw through is no longer part of the map.
+constexpr int kVisitsUntilGone = 3;
+
+/// Compares a place with what the visits of one session nearby saw: points they saw through are missed once more, or
+/// gone; points they saw are not. What stands where the place saw through, as two visits agree, is added to it. True
+/// where anything changed.
+bool update_place(PlacePoints& place, std::span<const Visit> visits, int session);
+
+}  // namespace revisit

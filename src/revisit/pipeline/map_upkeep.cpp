@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/pipeline/map_upkeep.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <deque>
+#include <map>
+#include <set>
+
+#include <revisit/mapping/map_changes.hpp>
+#include <revisit/pose_graph/edge_information.hpp>
+#include <revisit/store/keyframe_bytes.hpp>
+
+namespace revisit {
+namespace {
+
+struct Comparing {
+  static constexpr double kNear_m = 8.0;         ///< visits of a place
+  static constexpr std::size_t kMostVisits = 8;  ///< the nearest of them
+  static constexpr std::size_t kKept = 64;       ///< clouds in memory
+};
+
+struct Known {
+  static constexpr double kBeside_m = 2.0;      ///< an earlier place so near shows the same
+  static constexpr double kHeading_deg = 30.0;  ///< where the sensor does not see all round
+  static constexpr double kAllRound = 0.9;      ///< share of the directions in which something was seen
+  static constexpr double kRecognised_m = 5.0;  ///< travelled from a key frame with a loop
+  static constexpr int kAppearances = 4;        ///< of one place, where it looks another way and is not recognised
+};
+
+// What key frames of the session at work saw; of the last few, in memory.
+class VisitClouds {
+ public:
+  explicit VisitClouds(const MapStore& store) : store_(store) {}
+
+  Result<const std::vector<Point>*> get(FrameId frame) {
+    if (const auto found = clouds_.find(frame); found != clouds_.end()) return &found->second;
+    auto points = read(frame);
+    if (!points) return points.error();
+    if (order_.size() == Comparing::kKept) {
+      clouds_.erase(order_.front());
+      order_.pop_front();
+    }
+    order_.push_back(frame);
+    return &(clouds_[frame] = *std::move(points));
+  }
+
+ private:
+  Result<std::vector<Point>> read(FrameId frame) const {
+    const auto visit = store_.part(frame, MapStore::Part::kVisit);
+    if (!visit) return visit.error();
+    if (visit->empty()) return read_map_points(store_, frame);  // it became a place
+    auto points = to_map_points(*visit);
+    if (!points) return store_.damaged("visit", frame);
+    return *std::move(points);
+  }
+
+  const MapStore& store_;
+  std::map<FrameId, std::vector<Point>> clouds_;
+  std::deque<FrameId> order_;
+};
+
+// The key frames nearest to a place, of those in its part.
+std::vector<FrameId> visits_near(const KeyframeGraph& graph, const std::vector<FrameId>& visitors, FrameId place) {
+  const Eigen::Vector3d at_m = graph.T_world_lidar(place).translation();
+  std::vector<std::pair<double, FrameId>> near;
+  for (const FrameId each : visitors)
+    if (const double distance_m = (graph.T_world_lidar(each).translation() - at_m).norm();
+        distance_m < Comparing::kNear_m && graph.part(each) == graph.part(place))
+      near.emplace_back(distance_m, each);
+  std::sort(near.begin(), near.end());
+  near.resize(std::min(near.size(), Comparing::kMostVisits));
+  std::vector<FrameId> frames;
+  frames.reserve(near.size());
+  for (const auto& [distance_m, frame] : near) frames.push_back(frame);
+  return frames;
+}
+
+Status compare_place(MapStore& store, const KeyframeGraph& graph, VisitClouds& clouds, FrameId place,
+                     const std::vector<FrameId>& visitors, int session) {
+  auto stored = read_place_points(store, place);
+  if (!stored) return stored.error();
+  if (stored->compared_with >= session) return ok();
+  std::vector<Visit> visits;
+  visits.reserve(visitors.size());
+  for (const FrameId each : visitors) {
+    const auto points = clouds.get(each);
+    if (!points) return points.error();
+    visits.push_back({graph.T_world_lidar(each), **points});
+  }
+  PlacePoints points{graph.T_world_lidar(place), std::move(stored->points), std::move(stored->history)};
+  if (!update_place(points, visits, session)) return ok();
+  return write_place_points(store, place, {std::move(points.points), std::move(points.history), session});
+}
+
+}  // namespace
+
+Status compare_with_visits(MapStore& store, const KeyframeGraph& graph, int session) {
+  const auto visits = store.visits();
+  if (!visits) return visits.error();
+  if (visits->empty()) return ok();
+  const auto places = store.places();
+  if (!places) return places.error();
+  std::vector<FrameId> visitors = *visits;
+  for (const FrameId place : *places)
+    if (session_of(place) == session) visitors.push_back(place);
+  VisitClouds clouds(store);
+  for (const FrameId place : *places) {
+    if (session_of(place) == session) continue;
+    const std::vector<FrameId> near = visits_near(graph, visitors, place);
+    if (near.size() < 2) continue;
+    if (Status compared = compare_place(store, graph, clouds, place, near, session); !compared) return compared;
+  }
+  return store.forget_visits();
+}
+
+namespace {
+
+Result<bool> sees_all_round(const MapStore& store, FrameId place) {
+  const auto bytes = store.part(place, MapStore::Part::kPlace);
+  if (!bytes) return bytes.error();
+  const auto cloud = to_thin_cloud(*bytes);
+  if (!cloud) return store.damaged("place", place);
+  constexpr std::size_t kDirections = 72;
+  std::array<bool, kDirections> seen{};
+  for (const Eigen::Vector3f& p : cloud->points) {
+    const double turn = std::atan2(p.y(), p.x()) / (2.0 * kPi) + 0.5;
+    seen[std::min(kDirections - 1, static_cast<std::size_t>(turn * kDirections))] = true;
+  }
+  return static_cast<double>(std::count(seen.begin(), seen.end(), true)) >= Known::kAllRound * kDirections;
+}
+
+// Key frames that were recognised by loops with earlier sessions, or that were not far from one that was.
+std::vector<bool> recognised(const StoredMap& map) {
+  std::set<FrameId> found;
+  for (const LoopConstraint& loop : map.loops)
+    if (session_of(loop.query) != session_of(loop.match)) found.insert(std::max(loop.query, loop.match));
+  std::vector<bool> result(map.keyframes.size());
+  for (const bool backwards : {false, true}) {
+    double since_m = Known::kRecognised_m;
+    for (std::size_t n = 0; n < result.size(); ++n) {
+      const std::size_t i = backwards ? result.size() - 1 - n : n;
+      if (n > 0) {
+        const auto& a = map.keyframes[i].point;
+        const auto& b = map.keyframes[backwards ? i + 1 : i - 1].point;
+        const auto travelled_m = travelled_between_m(a, b);
+        since_m = travelled_m ? since_m + *travelled_m : Known::kRecognised_m;
+      }
+      if (found.contains(map.keyframes[i].frame.frame)) since_m = 0.0;
+      result[i] = result[i] || since_m < Known::kRecognised_m;
+    }
+  }
+  return result;
+}
+
+// The places that the map needs: those of which earlier sessions have another one beside them are left out, where it
+// was recognised there, or looks another way for the umpteenth time.
+Result<std::set<FrameId>> needed_places(const MapStore& store, const StoredMap& map) {
+  const auto places = store.places();
+  if (!places) return places.error();
+  std::map<FrameId, const StoredMap::Keyframe*> of_frame;
+  for (const auto& each : map.keyframes) of_frame[each.frame.frame] = &each;
+  const std::vector<bool> is_recognised = recognised(map);
+  std::set<FrameId> needed;
+  for (const FrameId place : *places) {
+    const auto found = of_frame.find(place);
+    if (found == of_frame.end()) return Error{store.file() + ": a place of the map is no key frame"};
+    const auto& here = found->second->settled;
+    std::optional<bool> all_round;
+    int beside = 0;
+    for (const FrameId other : needed) {
+      const auto& there = of_frame.at(other)->settled;
+      if (!here || !there || here->part != there->part || session_of(other) == session_of(place)) continue;
+      const Pose T = there->T_map_lidar.inverse() * here->T_map_lidar;
+      if (T.translation().norm() > Known::kBeside_m) continue;
+      if (!all_round) {
+        const auto seen = sees_all_round(store, place);
+        if (!seen) return seen.error();
+        all_round = *seen;
+      }
+      beside += *all_round || to_degrees(rotation_angle(T)) < Known::kHeading_deg;
+    }
+    const std::size_t index = static_cast<std::size_t>(found->second - map.keyframes.data());
+    if (beside == 0 || (!is_recognised[index] && beside < Known::kAppearances)) needed.insert(place);
+  }
+  return needed;
+}
+
+}  // namespace
+
+Result<bool> remove_known_ground(MapStore& store, const StoredMap& map) {
+  const auto is_place = needed_places(store, map);
+  if (!is_place) return is_place.error();
+  std::set<FrameId> has_loop;
+  for (const LoopConstraint& loop : map.loops)
+    if (is_place->contains(loop.query) || is_place->contains(loop.match)) {
+      has_loop.insert(loop.query);
+      has_loop.insert(loop.match);
+    }
+  // Sessions that stand alone in their part keep all they have, and so does the first of each part.
+  std::map<int, int> first_session_of_part;
+  for (const auto& each : map.keyframes)
+    if (each.settled) first_session_of_part.try_emplace(each.settled->part, session_of(each.frame.frame));
+  const auto is_joined = [&](const StoredMap::Keyframe& each) {
+    return each.settled && first_session_of_part.at(each.settled->part) != session_of(each.frame.frame);
+  };
+  std::vector<bool> stays(map.keyframes.size());
+  for (std::size_t i = 0; i < stays.size(); ++i)
+    stays[i] = is_place->contains(map.keyframes[i].frame.frame) || !is_joined(map.keyframes[i]);
+  // Whatever joins a run of new places to what was known: before it and after it.
+  const std::vector<bool> wanted = stays;
+  const auto session = [&](std::size_t i) { return session_of(map.keyframes[i].frame.frame); };
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    if (!wanted[i] || !is_joined(map.keyframes[i])) continue;
+    for (std::size_t k = i; k-- > 0 && session(k) == session(i) && !wanted[k];)
+      if (has_loop.contains(map.keyframes[k].frame.frame)) {
+        stays[k] = true;
+        break;
+      }
+    for (std::size_t k = i + 1; k < wanted.size() && session(k) == session(i) && !wanted[k]; ++k)
+      if (has_loop.contains(map.keyframes[k].frame.frame)) {
+        stays[k] = true;
+        break;
+      }
+  }
+  std::vector<FrameId> removed;
+  std::vector<MapStore::Joint> joints;
+  std::optional<MapStore::Joint> joint;  // from the last one that stays to the one at work
+  FrameId last;
+  for (std::size_t i = 0; i < stays.size(); ++i) {
+    const StoredMap::Keyframe& each = map.keyframes[i];
+    const FrameId frame = each.frame.frame;
+    if (each.edge) {
+      const bool starts = each.point.segment != map.keyframes[i - 1].point.segment;
+      if (!joint) {
+        joint = MapStore::Joint{{last, frame, each.edge->T_last_new, each.edge->information, {}}, starts};
+      } else {
+        joint->edge.information =
+            chained_information(joint->edge.information, each.edge->information, each.edge->T_last_new);
+        joint->edge.T_from_to = normalised(joint->edge.T_from_to * each.edge->T_last_new);
+        joint->starts_segment = joint->starts_segment || starts;
+      }
+      joint->edge.to = frame;
+    }
+    if (!stays[i]) {
+      removed.push_back(frame);
+      continue;
+    }
+    if (joint && i > 0 && !stays[i - 1]) {
+      if (joint->starts_segment) joint->edge.information = no_information();
+      joints.push_back(*joint);
+    }
+    joint.reset();
+    last = frame;
+  }
+  if (removed.empty()) return false;
+  if (const Status status = store.remove(removed, joints); !status) return status.error();
+  if (const Status status = store.commit(); !status) return status.error();
+  return true;
+}
+
+}  // namespace revisit
