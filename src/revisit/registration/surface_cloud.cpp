@@ -49,7 +49,7 @@ float nth(std::vector<float>& values, double share) {
   return *rank;
 }
 
-View view_of(const ThinCloud& cloud) {
+SensorView view_of(const ThinCloud& cloud) {
   std::vector<float> ranges, slopes;
   ranges.reserve(cloud.points.size());
   slopes.reserve(cloud.points.size());

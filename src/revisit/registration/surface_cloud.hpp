@@ -38,7 +38,7 @@ ThinCloud thin_for_registration(std::span<const Point> points, std::span<const s
 ThinCloud thin_surfaces(std::span<const Point> points, std::span<const std::uint8_t> is_ground, double voxel_m);
 
 /// What a scan could see, as its points show it: without the few that lie farthest out.
-struct View {
+struct SensorView {
   float farthest_m = 0.f;                         ///< of the points above ground
   float least_slope = 0.f, greatest_slope = 0.f;  ///< height over horizontal range, in the LiDAR's frame
 
@@ -70,7 +70,7 @@ class SurfaceCloud final : public Surface {
   double voxel_m() const { return static_cast<double>(cloud_.voxel_m); }
   float intensity(std::size_t i) const { return cloud_.intensity[i]; }
   const SeenSpace& seen() const { return cloud_.seen; }
-  const View& view() const { return view_; }
+  const SensorView& view() const { return view_; }
 
   struct Neighbour {
     std::size_t index = 0;
@@ -84,7 +84,7 @@ class SurfaceCloud final : public Surface {
  private:
   struct Grid;
   ThinCloud cloud_;
-  View view_;
+  SensorView view_;
   std::vector<Eigen::Vector3f> normals_;
   std::unique_ptr<Grid> grid_;
 };

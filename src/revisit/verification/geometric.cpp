@@ -37,7 +37,7 @@ struct Differing {
   static constexpr double kShare = 0.8;
 };
 
-bool sensors_differ(const View& a, const View& b) {
+bool sensors_differ(const SensorView& a, const SensorView& b) {
   const auto ratio = [](double x, double y) {
     const double less = std::min(x, y), more = std::max(x, y);
     return less > 0.0 ? more / less : 1.0;
