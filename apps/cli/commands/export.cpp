@@ -41,8 +41,6 @@ struct Part {
 
 // On the grid of a UTM zone. Points are kept as 32-bit numbers, which hold no millions: an offset stands beside them.
 Status put_on_earth(const SavedMap& map, const ExportOptions& options, Part& part) {
-  const auto fixes = map.store()->fixes();
-  if (!fixes) return fixes.error();
   const auto earth = map.store()->earth();
   if (!earth) return earth.error();
   const auto of_part =
@@ -51,9 +49,13 @@ Status put_on_earth(const SavedMap& map, const ExportOptions& options, Part& par
     return Error{options.map +
                  ": does not know where on the earth it is: it was made without --gps, or with too few "
                  "fixes (see info)"};
-  const GpsFix& origin = fixes->front().fix;
-  const EarthFrame frame(origin.latitude_deg, origin.longitude_deg, origin.altitude_m);
-  for (Pose& T : part.poses) T = frame.to_utm(of_part->T_earth_map * T);
+  const EarthFrame frame = EarthFrame(of_part->latitude_deg, of_part->longitude_deg, of_part->altitude_m)
+                               .with_zone_of(of_part->T_earth_map.translation());
+  for (Pose& T : part.poses) {
+    const auto utm = frame.to_utm(of_part->T_earth_map * T);
+    if (!utm) return Error{options.map + ": reaches too far out of UTM zone " + frame.utm_zone()};
+    T = *utm;
+  }
   const bool is_points = options.as != "tum" && options.as != "grid";
   if (is_points) {
     constexpr double kRound_m = 100.0;
@@ -169,6 +171,8 @@ int run_export(const ExportOptions& options) {
   std::error_code failure;
   fs::create_directories(options.out, failure);
   if (failure) return fail({options.out + ": cannot be created: " + failure.message()});
+  if (options.utm && options.as == "g2o")
+    return fail({"--utm: a pose graph has coordinates of its own; export tum instead"}, kUsage);
   if (options.utm)
     if (const Status placed = put_on_earth(*map, options, *part); !placed) return fail(placed.error());
   listen_for_interrupt();

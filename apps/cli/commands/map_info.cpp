@@ -50,22 +50,21 @@ int info_of_map(const std::string& path, bool check) {
   const auto fixes = map->store()->fixes();
   const auto earth = map->store()->earth();
   if (!fixes || !earth) return fail(fixes ? earth.error() : fixes.error());
-  if (!earth->empty()) {
-    const GpsFix& origin = fixes->front().fix;
-    const EarthFrame frame(origin.latitude_deg, origin.longitude_deg, origin.altitude_m);
-    for (const StoredEarth& each : *earth) {
-      const Eigen::Vector3d at = frame.geodetic(each.T_earth_map.translation());
-      const Eigen::Vector3d utm_m = frame.to_utm(each.T_earth_map).translation();
-      std::printf(
-          "on the earth part %d begins at %.7f, %.7f degrees, %.1f m; UTM %s (EPSG:%d) %.2f, %.2f; %zu GPS fixes\n",
-          each.part, at.x(), at.y(), at.z(), frame.utm_zone().c_str(), frame.epsg(), utm_m.x(), utm_m.y(),
-          fixes->size());
-    }
+  for (const StoredEarth& each : *earth) {
+    const Eigen::Vector3d begin = each.T_earth_map.translation();
+    const EarthFrame frame = EarthFrame(each.latitude_deg, each.longitude_deg, each.altitude_m).with_zone_of(begin);
+    const Eigen::Vector3d at = frame.geodetic(begin);
+    std::printf("on the earth part %d begins at %.7f, %.7f degrees, %.1f m", each.part, at.x(), at.y(), at.z());
+    if (const auto utm = frame.to_utm(each.T_earth_map))
+      std::printf("; UTM %s (EPSG:%d) %.2f, %.2f", frame.utm_zone().c_str(), frame.epsg(), utm->translation().x(),
+                  utm->translation().y());
+    std::printf("; %zu GPS fixes\n", fixes->size());
   }
   Table table = {{"session", "recording", "key frames", "length", "part"}};
   for (const StoredSession& session : map->stored().sessions) {
     const Counts& counts = sessions[session.id];
     std::string parts;
+    if (counts.keyframes == 0) parts = "on known ground";
     for (const int part : counts.parts) parts += (parts.empty() ? "" : ", ") + std::to_string(part);
     table.push_back({std::to_string(session.id), session.recording, std::to_string(counts.keyframes),
                      format("%.0f m", counts.length_m), parts});

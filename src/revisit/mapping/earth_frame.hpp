@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <revisit/core/gps_fix.hpp>
@@ -22,15 +23,19 @@ class EarthFrame {
   /// Latitude and longitude in degrees, altitude in metres.
   Eigen::Vector3d geodetic(const Eigen::Vector3d& east_north_up_m) const;
 
-  /// The same pose in the grid of the UTM zone that the frame's origin lies in: easting, northing, altitude above the
+  /// The same frame with the UTM zone in which a point of it lies, instead of that of its origin.
+  EarthFrame with_zone_of(const Eigen::Vector3d& east_north_up_m) const;
+  /// The same pose in the grid of the UTM zone: easting, northing, altitude above the
   /// ellipsoid; its axes are those of the grid. Metres at the pose are those of the grid to 0.04 %.
-  Pose to_utm(const Pose& T_earth) const;
+  /// Nothing where the pose is far out of the zone.
+  std::optional<Pose> to_utm(const Pose& T_earth) const;
   std::string utm_zone() const;  ///< "32N"
   int epsg() const;              ///< of the zone, WGS 84
 
  private:
   double latitude_deg_, longitude_deg_, altitude_m_;
   int zone_ = 0;
+  bool is_north_ = true;
 };
 
 }  // namespace revisit

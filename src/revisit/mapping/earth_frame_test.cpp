@@ -31,16 +31,22 @@ TEST(EarthFrame, UtmHasItsZoneItsScaleAndItsNorth) {
   EXPECT_EQ(frame.utm_zone(), "32N");
   EXPECT_EQ(frame.epsg(), 32632);
   Pose T = Pose::Identity();
-  EXPECT_NEAR(frame.to_utm(T).translation().x(), 500000.0, 1e-3);
-  EXPECT_TRUE(frame.to_utm(T).linear().isApprox(Eigen::Matrix3d::Identity(), 1e-9));
+  EXPECT_NEAR(frame.to_utm(T)->translation().x(), 500000.0, 1e-3);
+  EXPECT_TRUE(frame.to_utm(T)->linear().isApprox(Eigen::Matrix3d::Identity(), 1e-9));
   T.translation() << 0.0, 1000.0, 0.0;
-  EXPECT_NEAR((frame.to_utm(T).translation() - frame.to_utm(Pose::Identity()).translation()).y(), 999.6, 0.01);
+  EXPECT_NEAR((frame.to_utm(T)->translation() - frame.to_utm(Pose::Identity())->translation()).y(), 999.6, 0.01);
   // East of it the grid's north lies to the right of true north, by the longitude's share of the latitude's sine.
   const EarthFrame east(49.0, 11.0, 0.0);
-  EXPECT_NEAR(yaw_of(east.to_utm(Pose::Identity())), to_radians(2.0) * std::sin(to_radians(49.0)), 1e-4);
-  const Eigen::Vector3d at = east.to_utm(T).translation() - east.to_utm(Pose::Identity()).translation();
-  const Eigen::Vector3d turned = east.to_utm(Pose::Identity()).linear() * T.translation();
+  EXPECT_NEAR(yaw_of(*east.to_utm(Pose::Identity())), to_radians(2.0) * std::sin(to_radians(49.0)), 1e-4);
+  const Eigen::Vector3d at = east.to_utm(T)->translation() - east.to_utm(Pose::Identity())->translation();
+  const Eigen::Vector3d turned = east.to_utm(Pose::Identity())->linear() * T.translation();
   EXPECT_LT((at - turned).norm(), 0.5) << "the axes are those of the grid";
+  // Farther than a zone reaches there is no such grid, but that of the zone there.
+  Pose T_far = Pose::Identity();
+  T_far.translation() = frame.east_north_up_m(fix(49.0, 60.0, 0.0));
+  EXPECT_FALSE(frame.to_utm(T_far));
+  EXPECT_EQ(frame.with_zone_of(T_far.translation()).utm_zone(), "41N");
+  EXPECT_TRUE(frame.with_zone_of(T_far.translation()).to_utm(T_far));
   EXPECT_EQ(EarthFrame(-33.9, 18.4, 0.0).epsg(), 32734);
   EXPECT_THROW(EarthFrame(91.0, 0.0, 0.0), std::invalid_argument);
   EXPECT_THROW(EarthFrame(std::nan(""), 0.0, 0.0), std::invalid_argument);

@@ -85,6 +85,25 @@ TEST(Localiser, AnswersTheSameWhetherTheIndexIsReadOrMade) {
   EXPECT_TRUE(found[0].isApprox(found[1], 1e-9));
 }
 
+// Another program takes places out of the map while this one looks for scans in it.
+TEST(Localiser, PlacesThatAreTakenOutMeanwhileAreNoError) {
+  const fs::path map = small_map();
+  auto localiser = Localiser::open(map);
+  ASSERT_TRUE(localiser) << localiser.error().message;
+  {
+    auto store = MapStore::open(map / MapStore::kFileName);
+    ASSERT_TRUE(store);
+    std::vector<FrameId> most = *store->places();
+    most.erase(most.begin());
+    ASSERT_TRUE(store->remove(most, {}));
+    ASSERT_TRUE(store->commit());
+  }
+  const auto found = localiser->locate(town().scan(SyntheticWorld::at(3.3, 0.7, 1.0), kSensor, 900));
+  ASSERT_TRUE(found) << found.error().message;
+  Scan scan = town().scan(SyntheticWorld::at(3.3, 0.7, 1.0), kSensor, 901);
+  EXPECT_TRUE(localiser->follow(std::move(scan)));
+}
+
 // Found, followed, carried elsewhere, found again.
 TEST(Localiser, FollowsADriveAndFindsAKidnappedRobotAgain) {
   auto localiser = Localiser::open(small_map());

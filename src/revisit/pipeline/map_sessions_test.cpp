@@ -142,6 +142,30 @@ TEST(MapSessions, KnownGroundAddsNothingForGood) {
   EXPECT_LT(off_m(*map, 0, there, 4, there), 0.3);
 }
 
+// A session that goes on to new ground: what joins that to the map stays, with the odometry between.
+TEST(MapSessions, NewGroundStaysJoinedWhenKnownGroundGoes) {
+  const fs::path folder = fresh_folder();
+  const auto farther = [](int i) { return SyntheticWorld::at(-5.0 + kSessionStep_m * i, 0.3, 0.0); };
+  (void)drive(folder, there, 61);
+  ASSERT_TRUE(drive(folder, farther, 61, true)->is_joined());
+  const auto before = SavedMap::open(folder);
+  ASSERT_TRUE(before);
+  const auto third = drive(folder, there, 61, true);
+  ASSERT_TRUE(third->is_joined());
+  std::map<int, std::size_t> keyframes;
+  for (const FrameId frame : third->graph().keyframes()) {
+    ++keyframes[session_of(frame)];
+    EXPECT_EQ(third->graph().part(frame), 0);
+  }
+  std::size_t of_second = 0;
+  for (const auto& each : before->stored().keyframes) of_second += session_of(each.frame.frame) == 1;
+  EXPECT_GT(keyframes[1], 3u) << "what is new";
+  EXPECT_LT(keyframes[1], of_second) << "not what was known";
+  const auto map = SavedMap::open(folder);
+  ASSERT_TRUE(map) << map.error().message;
+  EXPECT_LT(off_m(*map, 0, there, 1, farther), 0.4);
+}
+
 TEST(MapSessions, AnotherPlaceWaitsBesideTheMap) {
   const fs::path folder = fresh_folder();
   (void)drive(folder, there, 61);

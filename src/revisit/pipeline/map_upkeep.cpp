@@ -6,6 +6,8 @@
 #include <cmath>
 #include <deque>
 #include <map>
+#include <numeric>
+#include <optional>
 #include <set>
 
 #include <revisit/mapping/map_changes.hpp>
@@ -61,19 +63,26 @@ class VisitClouds {
   std::deque<FrameId> order_;
 };
 
+struct Visitor {
+  FrameId frame;
+  int part = 0;
+  Eigen::Vector3d at_m = Eigen::Vector3d::Zero();
+};
+
 // The key frames nearest to a place, of those in its part.
-std::vector<FrameId> visits_near(const KeyframeGraph& graph, const std::vector<FrameId>& visitors, FrameId place) {
+std::vector<FrameId> visits_near(const KeyframeGraph& graph, const std::vector<Visitor>& visitors, FrameId place) {
   const Eigen::Vector3d at_m = graph.T_world_lidar(place).translation();
+  const int part = graph.part(place);
   std::vector<std::pair<double, FrameId>> near;
-  for (const FrameId each : visitors)
-    if (const double distance_m = (graph.T_world_lidar(each).translation() - at_m).norm();
-        distance_m < Comparing::kNear_m && graph.part(each) == graph.part(place))
-      near.emplace_back(distance_m, each);
+  for (const Visitor& each : visitors)
+    if (const double distance2_m2 = (each.at_m - at_m).squaredNorm();
+        distance2_m2 < Comparing::kNear_m * Comparing::kNear_m && each.part == part)
+      near.emplace_back(distance2_m2, each.frame);
   std::sort(near.begin(), near.end());
   near.resize(std::min(near.size(), Comparing::kMostVisits));
   std::vector<FrameId> frames;
   frames.reserve(near.size());
-  for (const auto& [distance_m, frame] : near) frames.push_back(frame);
+  for (const auto& [distance2_m2, frame] : near) frames.push_back(frame);
   return frames;
 }
 
@@ -102,12 +111,15 @@ Status compare_with_visits(MapStore& store, const KeyframeGraph& graph, int sess
   if (visits->empty()) return ok();
   const auto places = store.places();
   if (!places) return places.error();
-  std::vector<FrameId> visitors = *visits;
-  for (const FrameId place : *places)
-    if (session_of(place) == session) visitors.push_back(place);
+  // Those that a run left which was never finished are not this session's.
+  std::vector<Visitor> visitors;
+  for (const std::vector<FrameId>* frames : {&*visits, &*places})
+    for (const FrameId each : *frames)
+      if (session_of(each) == session && graph.has(each))
+        visitors.push_back({each, graph.part(each), graph.T_world_lidar(each).translation()});
   VisitClouds clouds(store);
   for (const FrameId place : *places) {
-    if (session_of(place) == session) continue;
+    if (session_of(place) == session || !graph.has(place)) continue;
     const std::vector<FrameId> near = visits_near(graph, visitors, place);
     if (near.size() < 2) continue;
     if (Status compared = compare_place(store, graph, clouds, place, near, session); !compared) return compared;
@@ -163,28 +175,115 @@ Result<std::set<FrameId>> needed_places(const MapStore& store, const StoredMap& 
   for (const auto& each : map.keyframes) of_frame[each.frame.frame] = &each;
   const std::vector<bool> is_recognised = recognised(map);
   std::set<FrameId> needed;
+  std::map<std::array<int, 4>, std::vector<FrameId>> by_cell;  // part, and cells as wide as the reach
+  const auto cell_of = [](const StoredMapPose& at) {
+    const Eigen::Vector3i cell = (at.T_map_lidar.translation() / Known::kBeside_m).array().floor().cast<int>();
+    return std::array<int, 4>{at.part, cell.x(), cell.y(), cell.z()};
+  };
   for (const FrameId place : *places) {
     const auto found = of_frame.find(place);
     if (found == of_frame.end()) return Error{store.file() + ": a place of the map is no key frame"};
     const auto& here = found->second->settled;
     std::optional<bool> all_round;
     int beside = 0;
-    for (const FrameId other : needed) {
-      const auto& there = of_frame.at(other)->settled;
-      if (!here || !there || here->part != there->part || session_of(other) == session_of(place)) continue;
-      const Pose T = there->T_map_lidar.inverse() * here->T_map_lidar;
-      if (T.translation().norm() > Known::kBeside_m) continue;
+    const auto count_beside = [&](FrameId other) -> Status {
+      const Pose T = of_frame.at(other)->settled->T_map_lidar.inverse() * here->T_map_lidar;
+      if (session_of(other) == session_of(place) || T.translation().norm() > Known::kBeside_m) return ok();
       if (!all_round) {
         const auto seen = sees_all_round(store, place);
         if (!seen) return seen.error();
         all_round = *seen;
       }
       beside += *all_round || to_degrees(rotation_angle(T)) < Known::kHeading_deg;
+      return ok();
+    };
+    for (int around = 0; here && around < 27; ++around) {
+      std::array<int, 4> cell = cell_of(*here);
+      cell[1] += around % 3 - 1, cell[2] += around / 3 % 3 - 1, cell[3] += around / 9 - 1;
+      const auto others = by_cell.find(cell);
+      if (others == by_cell.end()) continue;
+      for (const FrameId other : others->second)
+        if (const Status counted = count_beside(other); !counted) return counted.error();
     }
     const std::size_t index = static_cast<std::size_t>(found->second - map.keyframes.data());
-    if (beside == 0 || (!is_recognised[index] && beside < Known::kAppearances)) needed.insert(place);
+    if (beside > 0 && (is_recognised[index] || beside >= Known::kAppearances)) continue;
+    needed.insert(place);
+    if (here) by_cell[cell_of(*here)].push_back(place);
   }
   return needed;
+}
+
+}  // namespace
+
+namespace {
+
+// GPS holds the map on the earth: of key frames that would go, one keeps its fix where no other one is near.
+void keep_fixes(const std::vector<StoredFix>& fixes, const StoredMap& map, std::vector<bool>& stays) {
+  constexpr double kApart_m = 15.0;
+  std::set<FrameId> has_fix;
+  for (const StoredFix& each : fixes) has_fix.insert(each.keyframe);
+  std::vector<std::size_t> kept;
+  for (const bool first : {true, false})
+    for (std::size_t i = 0; i < stays.size(); ++i) {
+      const auto& each = map.keyframes[i];
+      if (stays[i] != first || !each.settled || !has_fix.contains(each.frame.frame)) continue;
+      const bool is_covered = !first && std::any_of(kept.begin(), kept.end(), [&](std::size_t other) {
+        const StoredMapPose& there = *map.keyframes[other].settled;
+        const Eigen::Vector3d apart_m = there.T_map_lidar.translation() - each.settled->T_map_lidar.translation();
+        return there.part == each.settled->part && apart_m.norm() < kApart_m;
+      });
+      if (is_covered) continue;
+      stays[i] = true;
+      kept.push_back(i);
+    }
+}
+
+// Whatever was one part before stays one: a session without which it would fall apart keeps all it has, and what its
+// loops lead to.
+void keep_together(const StoredMap& map, std::vector<bool>& stays) {
+  std::map<FrameId, std::size_t> index;
+  for (std::size_t i = 0; i < stays.size(); ++i) index[map.keyframes[i].frame.frame] = i;
+  for (bool is_whole = false; !is_whole;) {
+    is_whole = true;
+    std::vector<std::size_t> root(stays.size());
+    std::iota(root.begin(), root.end(), std::size_t{0});
+    const auto find = [&](std::size_t i) {
+      while (root[i] != i) i = root[i] = root[root[i]];
+      return i;
+    };
+    std::optional<std::size_t> last;  // that stays
+    bool is_gap = true;
+    for (std::size_t i = 0; i < stays.size(); ++i) {
+      is_gap = is_gap || i == 0 || map.keyframes[i].point.segment != map.keyframes[i - 1].point.segment;
+      if (!stays[i]) continue;
+      if (last && !is_gap) root[find(i)] = find(*last);
+      last = i;
+      is_gap = false;
+    }
+    for (const LoopConstraint& loop : map.loops)
+      if (const std::size_t a = index.at(loop.match), b = index.at(loop.query); stays[a] && stays[b])
+        root[find(a)] = find(b);
+    std::map<int, std::size_t> root_of_part;
+    std::set<int> torn;  // sessions
+    for (std::size_t i = 0; i < stays.size(); ++i) {
+      const auto& settled = map.keyframes[i].settled;
+      if (!stays[i] || !settled) continue;
+      if (root_of_part.try_emplace(settled->part, find(i)).first->second != find(i))
+        torn.insert(session_of(map.keyframes[i].frame.frame));
+    }
+    const auto keep = [&](std::size_t i) {
+      if (stays[i]) return;
+      stays[i] = true;
+      is_whole = false;
+    };
+    for (std::size_t i = 0; i < stays.size(); ++i)
+      if (torn.contains(session_of(map.keyframes[i].frame.frame))) keep(i);
+    for (const LoopConstraint& loop : map.loops) {
+      if (!torn.contains(session_of(loop.match)) && !torn.contains(session_of(loop.query))) continue;
+      keep(index.at(loop.match));
+      keep(index.at(loop.query));
+    }
+  }
 }
 
 }  // namespace
@@ -224,6 +323,10 @@ Result<bool> remove_known_ground(MapStore& store, const StoredMap& map) {
         break;
       }
   }
+  const auto fixes = store.fixes();
+  if (!fixes) return fixes.error();
+  keep_fixes(*fixes, map, stays);
+  keep_together(map, stays);
   std::vector<FrameId> removed;
   std::vector<MapStore::Joint> joints;
   std::optional<MapStore::Joint> joint;  // from the last one that stays to the one at work
@@ -256,7 +359,6 @@ Result<bool> remove_known_ground(MapStore& store, const StoredMap& map) {
   }
   if (removed.empty()) return false;
   if (const Status status = store.remove(removed, joints); !status) return status.error();
-  if (const Status status = store.commit(); !status) return status.error();
   return true;
 }
 

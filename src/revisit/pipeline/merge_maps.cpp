@@ -90,13 +90,16 @@ Result<SlamBackEnd::Entry> Merger::entry(const Source& source, const StoredMap::
       entry.T_world_lidar = normalised(back_end_.graph().T_world_lidar(anchor->second.frame) *
                                        anchor->second.T_map_lidar.inverse() * keyframe.settled->T_map_lidar);
   }
-  for (const auto& [part, bytes] : {std::pair{MapStore::Part::kDescriptor, &entry.row.descriptor},
-                                    {MapStore::Part::kPlace, &entry.row.place},
-                                    {MapStore::Part::kCloud, &entry.row.cloud}}) {
+  for (const auto& [part, bytes] :
+       {std::pair{MapStore::Part::kDescriptor, &entry.row.descriptor}, {MapStore::Part::kPlace, &entry.row.place}}) {
     auto read = source.store.part(frame, part);
     if (!read) return read.error();
     *bytes = *std::move(read);
   }
+  // As its map is now: what was gone stays so.
+  const auto points = read_map_points(source.store, frame);
+  if (!points) return points.error();
+  entry.row.cloud = to_map_bytes(*points);
   if (entry.row.descriptor.empty()) return entry;
   auto descriptor = to_descriptor(entry.row.descriptor);
   auto cloud = to_thin_cloud(entry.row.place);

@@ -49,12 +49,12 @@ Result<Slam> Slam::open(std::shared_ptr<MapStore> store, const Parameters& param
 Status Slam::restore(const SlamSetup& setup) {
   auto map = read_map(*store_);
   if (!map) return map.error();
-  if (setup.new_session) {
-    const auto removed = remove_known_ground(*store_, *map);
-    if (!removed) return removed.error();
-    if (*removed) map = read_map(*store_);
-    if (!map) return map.error();
-  }
+  // What goes is gone once the new session has a key frame.
+  Result<bool> removed = false;
+  if (setup.new_session) removed = remove_known_ground(*store_, *map);
+  if (!removed) return removed.error();
+  if (*removed) map = read_map(*store_);
+  if (!map) return map.error();
   StoredSession session{0, setup.recording, setup.parameters, {}};
   const bool continues = !map->sessions.empty() && !setup.new_session;
   if (continues)
@@ -65,6 +65,8 @@ Status Slam::restore(const SlamSetup& setup) {
   if (!continues)
     if (const Status status = store_->set(session); !status) return status;
   if (const Status status = back_end_.restore(*map, session); !status) return status;
+  if (*removed)
+    if (const Status status = back_end_.renumber_parts(*map); !status) return status;
   if (map->keyframes.empty()) return ok();
   if (session_of(map->keyframes.back().frame.frame) != session_) {
     front_end_.begin_session(map->keyframes.back().point.segment + 1);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <string>
 #include <utility>
 
@@ -232,20 +233,36 @@ Status SlamBackEnd::add_fix(FrameId keyframe, double stamp_s) {
   const bool crosses = std::abs(a.longitude_deg - b.longitude_deg) > 180.0;  // the date line
   if (!(gap_s > 0.0 && gap_s < kGap_s) || crosses) return ok();
   const auto between = [share](double from, double to) { return from + share * (to - from); };
+  GpsFix fix{stamp_s, between(a.latitude_deg, b.latitude_deg), between(a.longitude_deg, b.longitude_deg),
+             between(a.altitude_m, b.altitude_m), a.deviation_m.cwiseMax(b.deviation_m)};
+  const bool is_place =
+      std::abs(fix.latitude_deg) <= 90.0 && std::abs(fix.longitude_deg) <= 180.0 && std::isfinite(fix.altitude_m);
+  if (!is_place) return ok();
+  // Receivers that know nothing of their errors say 0, or infinite.
+  constexpr double kLeast_m = 1e-3, kUnknown_m = 5.0, kMost_m = 1e4;
+  for (double& each : fix.deviation_m)
+    each = std::isfinite(each) && each > 0.0 ? std::clamp(each, kLeast_m, kMost_m) : kUnknown_m;
   last_fix_at_m_ = at_m;
-  return store_->add(
-      StoredFix{keyframe,
-                {stamp_s, between(a.latitude_deg, b.latitude_deg), between(a.longitude_deg, b.longitude_deg),
-                 between(a.altitude_m, b.altitude_m), a.deviation_m.cwiseMax(b.deviation_m)}});
+  return store_->add(StoredFix{keyframe, fix});
 }
 
 // The whole graph, on the earth where fixes tell.
 Status SlamBackEnd::settle_all() {
   const auto fixes = store_->fixes();
   if (!fixes) return fixes.error();
-  if (fixes->empty()) return graph_.settle();
-  const GpsFix& origin = fixes->front().fix;
-  const EarthFrame earth(origin.latitude_deg, origin.longitude_deg, origin.altitude_m);
+  if (fixes->empty()) {
+    const Status settled = graph_.settle();
+    return settled ? store_->set_earth({}) : settled;
+  }
+  // The middle one of each coordinate: a fix that is wrong altogether is no origin.
+  const auto middle = [&](double GpsFix::*member) {
+    std::vector<double> values;
+    values.reserve(fixes->size());
+    for (const StoredFix& each : *fixes) values.push_back(each.fix.*member);
+    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+    return values[values.size() / 2];
+  };
+  const EarthFrame earth(middle(&GpsFix::latitude_deg), middle(&GpsFix::longitude_deg), middle(&GpsFix::altitude_m));
   std::vector<KeyframeGraph::Fix> on_earth;
   on_earth.reserve(fixes->size());
   for (const StoredFix& each : *fixes)
@@ -253,7 +270,8 @@ Status SlamBackEnd::settle_all() {
   const auto placed = graph_.settle_on_earth(on_earth);
   if (!placed) return placed.error();
   std::vector<StoredEarth> parts;
-  for (const auto& [part, T_earth_map] : *placed) parts.push_back({part, T_earth_map});
+  for (const auto& [part, T_earth_map] : *placed)
+    parts.push_back({part, earth.latitude_deg(), earth.longitude_deg(), earth.altitude_m(), T_earth_map});
   if (parts.empty())
     log_to(log_, LogLevel::kWarning,
            "GPS: " + std::to_string(fixes->size()) +
@@ -262,12 +280,28 @@ Status SlamBackEnd::settle_all() {
   return store_->set_earth(parts);
 }
 
-Status SlamBackEnd::write_map_poses() {
+Status SlamBackEnd::set_map_poses() {
   std::vector<StoredMapPose> poses;
   poses.reserve(graph_.keyframes().size());
   for (const FrameId frame : graph_.keyframes())
     poses.push_back({frame, graph_.T_world_lidar(frame), graph_.part(frame)});
-  if (Status written = store_->set_map_poses(poses); !written) return written;
+  return store_->set_map_poses(poses);
+}
+
+Status SlamBackEnd::renumber_parts(const StoredMap& map) {
+  std::map<int, int> renumbered;
+  for (const auto& each : map.keyframes)
+    if (each.settled) renumbered[each.settled->part] = graph_.part(each.frame.frame);
+  auto earth = store_->earth();
+  if (!earth) return earth.error();
+  for (StoredEarth& each : *earth)
+    if (const auto found = renumbered.find(each.part); found != renumbered.end()) each.part = found->second;
+  if (Status set = store_->set_earth(*earth); !set) return set;
+  return set_map_poses();
+}
+
+Status SlamBackEnd::write_map_poses() {
+  if (Status written = set_map_poses(); !written) return written;
   const Status saved = recognition_.index().save(
       [this](std::size_t offset, std::span<const std::byte> piece) { return store_->add_index(offset, piece); });
   return saved ? store_->set_place_poses(poses_of_places()) : saved;

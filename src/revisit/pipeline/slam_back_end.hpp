@@ -48,6 +48,9 @@ class SlamBackEnd {
   /// The map of before; `session` is the one that this run adds or continues.
   Status restore(const StoredMap& map, const StoredSession& session);
 
+  /// Parts are counted by their segments: once some have gone, what the map says of its parts is written anew.
+  Status renumber_parts(const StoredMap& map);
+
   const KeyframeGraph& graph() const { return graph_; }
   std::size_t places() const { return recognition_.index().size(); }
 
@@ -56,6 +59,7 @@ class SlamBackEnd {
   Result<Detection> find_loop(const PreparedScan& keyframe, const SensorFacts& sensor);
   KeyframeGraph::OdometryEdge edge_to(const TrajectoryPoint& point, const Matrix6& information) const;
   Status write_map_poses();
+  Status set_map_poses();
   Status add_fix(FrameId keyframe, double stamp_s);
   Status settle_all();
   std::vector<StoredMapPose> poses_of_places() const;

@@ -4,11 +4,13 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <span>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -116,6 +118,12 @@ TEST_F(PlaceFile, InPiecesItAnswersTheSameAndNoticesWhatWasAltered) {
     ASSERT_EQ(found->size(), expected.size());
     for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_EQ((*found)[i].match, expected[i].match);
     EXPECT_TRUE(opened->check());
+  }
+  // Destroyed while the rest is read in the background.
+  for (const int wait_ms : {0, 300, 302}) {
+    const auto opened = PlaceIndex::open("pieces", size, read, options());
+    ASSERT_TRUE(opened);
+    std::this_thread::sleep_for(std::chrono::milliseconds(wait_ms));
   }
   for (auto& [offset, bytes] : pieces) {
     bytes.back() ^= std::byte{1};

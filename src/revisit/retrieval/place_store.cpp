@@ -21,6 +21,9 @@ ChunkLayout::ChunkLayout(int rings, int sectors, int levels)
 }
 
 PlaceStore::~PlaceStore() {
+  // It reads into the chunks.
+  background_.request_stop();
+  if (background_.joinable()) background_.join();
   for (std::size_t i = 0; i < kMostChunks; ++i) {
     const Chunk* chunk = chunks_[i].load(std::memory_order_relaxed);
     if (chunk == nullptr) break;

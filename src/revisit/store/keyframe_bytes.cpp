@@ -148,6 +148,12 @@ Bytes to_map_bytes(const ThinCloud& cloud) {
   return writer.take();
 }
 
+Bytes to_map_bytes(std::span<const Point> points) {
+  Writer writer;
+  for (const Point& p : points) (void)put_map_point(writer, p);
+  return writer.take();
+}
+
 std::optional<std::vector<Point>> to_map_points(std::span<const std::byte> bytes) {
   if (bytes.size() % kMapPointBytes != 0) return std::nullopt;
   std::vector<Point> points(bytes.size() / kMapPointBytes);

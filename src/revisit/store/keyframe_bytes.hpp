@@ -23,6 +23,7 @@ std::optional<ThinCloud> to_thin_cloud(std::span<const std::byte> bytes);
 
 /// A cloud for the map: positions to a centimetre (up to 327 m), intensity in 255 steps of [0, 1]; 7 bytes a point.
 Bytes to_map_bytes(const ThinCloud& cloud);
+Bytes to_map_bytes(std::span<const Point> points);
 std::optional<std::vector<Point>> to_map_points(std::span<const std::byte> bytes);
 /// Points with their histories, and the session that was compared with them last.
 struct StoredPlacePoints {

@@ -138,12 +138,17 @@ Result<std::vector<StoredFix>> MapStore::fixes() const {
 
 Result<std::vector<StoredEarth>> MapStore::earth() const {
   std::vector<StoredEarth> rows;
-  Statement statement =
-      database_->prepare("SELECT part,T_earth_map,sum=checksum(part,T_earth_map) FROM earth ORDER BY part");
+  Statement statement = database_->prepare(
+      "SELECT part,latitude_deg,longitude_deg,altitude_m,T_earth_map,"
+      "sum=checksum(part,latitude_deg,longitude_deg,altitude_m,T_earth_map) FROM earth ORDER BY part");
   while (statement.step()) {
-    const auto pose = to_pose(statement.bytes(1));
-    if (!pose || statement.integer(2) == 0) return database_->damaged("earth", statement.integer(0));
-    rows.push_back({static_cast<int>(statement.integer(0)), *pose});
+    const auto pose = to_pose(statement.bytes(4));
+    const StoredEarth row{static_cast<int>(statement.integer(0)), statement.real(1), statement.real(2),
+                          statement.real(3), pose.value_or(Pose::Identity())};
+    const bool is_place =
+        std::abs(row.latitude_deg) <= 90.0 && std::abs(row.longitude_deg) <= 180.0 && std::isfinite(row.altitude_m);
+    if (!pose || !is_place || statement.integer(5) == 0) return database_->damaged("earth", statement.integer(0));
+    rows.push_back(row);
   }
   if (const Status status = statement.status(); !status) return status.error();
   return rows;
@@ -216,9 +221,17 @@ Result<Bytes> MapStore::part(FrameId keyframe, Part part) const {
     return Bytes(bytes.begin(), bytes.end());
   }
   if (const Status status = statement.status(); !status) return status.error();
-  Statement known = database_->prepare("SELECT 1 FROM keyframes WHERE frame=?");
-  if (known.bind(keyframe.value).step()) return Bytes();
+  const auto known = has(keyframe);
+  if (!known) return known.error();
+  if (*known) return Bytes();
   return Error{database_->file + ": has no key " + to_text(keyframe)};
+}
+
+Result<bool> MapStore::has(FrameId keyframe) const {
+  Statement statement = database_->prepare("SELECT 1 FROM keyframes WHERE frame=?");
+  if (statement.bind(keyframe.value).step()) return true;
+  if (const Status status = statement.status(); !status) return status.error();
+  return false;
 }
 
 namespace {

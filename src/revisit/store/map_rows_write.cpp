@@ -53,18 +53,21 @@ Status MapStore::forget_visits() {
 Status MapStore::remove(std::span<const FrameId> keyframes, std::span<const Joint> joints) {
   if (const Status begun = database_->begin(); !begun) return begun;
   if (const Status dropped = database_->drop_index(); !dropped) return dropped;
-  for (const char* sql :
-       {"DELETE FROM keyframes WHERE frame=?1", "DELETE FROM map_poses WHERE frame=?1",
-        "DELETE FROM fixes WHERE frame=?1", "DELETE FROM scans WHERE keyframe=?1", "DELETE FROM answers WHERE query=?1",
-        "DELETE FROM descriptors WHERE frame=?1", "DELETE FROM places WHERE frame=?1",
-        "DELETE FROM clouds WHERE frame=?1", "DELETE FROM changes WHERE frame=?1",
-        "DELETE FROM edges WHERE from_frame=?1 OR to_frame=?1"}) {
-    Statement statement = database_->prepare(sql);
-    for (const FrameId frame : keyframes) {
-      if (const Status status = statement.bind(frame.value).run(); !status) return status;
-      statement.reset();
-    }
+  Status listed = database_->run("CREATE TEMP TABLE IF NOT EXISTS removed(frame INTEGER PRIMARY KEY)");
+  if (!listed) return listed;
+  Statement list = database_->prepare("INSERT OR IGNORE INTO removed VALUES(?)");
+  for (const FrameId frame : keyframes) {
+    if (Status status = list.bind(frame.value).run(); !status) return status;
+    list.reset();
   }
+  for (const char* of :
+       {"keyframes WHERE frame", "map_poses WHERE frame", "fixes WHERE frame", "descriptors WHERE frame",
+        "places WHERE frame", "clouds WHERE frame", "changes WHERE frame", "visits WHERE frame", "scans WHERE keyframe",
+        "answers WHERE query", "edges WHERE from_frame", "edges WHERE to_frame"}) {
+    const std::string sql = "DELETE FROM " + std::string(of) + " IN (SELECT frame FROM removed)";
+    if (Status status = database_->run(sql.c_str()); !status) return status;
+  }
+  if (Status status = database_->run("DELETE FROM removed"); !status) return status;
   for (const Joint& each : joints) {
     if (const Status status = add(each.edge); !status) return status;
     if (!each.starts_segment) continue;
@@ -134,8 +137,11 @@ Status MapStore::set_earth(std::span<const StoredEarth> parts) {
   if (const Status status = database_->run("DELETE FROM earth"); !status) return status;
   for (const StoredEarth& each : parts) {
     const auto pose = numbers_of(each.T_earth_map);
-    const Status status = database_->prepare("INSERT INTO earth VALUES(?1,?2,checksum(?1,?2))")
+    const Status status = database_->prepare("INSERT INTO earth VALUES(?1,?2,?3,?4,?5,checksum(?1,?2,?3,?4,?5))")
                               .bind(std::int64_t{each.part})
+                              .bind(each.latitude_deg)
+                              .bind(each.longitude_deg)
+                              .bind(each.altitude_m)
                               .bind(std::as_bytes(std::span(pose)))
                               .run();
     if (!status) return status;

@@ -67,9 +67,10 @@ struct StoredFix {
   GpsFix fix;
 };
 
-/// How a part of the map lies on the earth: east, north and up of the map's first fix.
+/// How a part of the map lies on the earth: east, north and up of a point of it.
 struct StoredEarth {
   int part = 0;
+  double latitude_deg = 0.0, longitude_deg = 0.0, altitude_m = 0.0;
   Pose T_earth_map = Pose::Identity();
 };
 
@@ -168,6 +169,8 @@ class MapStore {
   enum class Part { kDescriptor, kPlace, kCloud, kVisit, kChanges };
   /// Empty where the place was known already. An unknown frame is an error.
   Result<Bytes> part(FrameId keyframe, Part part) const;
+  /// Whether it is a key frame of the map: another program may have taken it out by now.
+  Result<bool> has(FrameId keyframe) const;
   /// Reads everything: an error names the first row that is not what was written.
   Status check() const;
   const std::string& file() const;

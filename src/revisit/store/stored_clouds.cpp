@@ -25,6 +25,8 @@ class InStore final : public PlaceClouds {
       return found->second.cloud;
     }
     const auto bytes = store_->part(frame, MapStore::Part::kPlace);
+    if (const auto known = store_->has(frame); !bytes && known && !*known)
+      return std::make_shared<const ThinCloud>();  // taken out of the map since: nothing is to be seen there
     if (!bytes) return bytes.error();
     auto cloud = to_thin_cloud(*bytes);
     if (!cloud) return store_->damaged("place", frame);

@@ -9,7 +9,7 @@
 namespace revisit {
 
 /// The clouds of a map's key frames, read when they are needed; the `kept` latest used stay in memory. A cloud that is
-/// put must be in the store already.
+/// put must be in the store already. One that has been taken out of the map since is empty.
 std::unique_ptr<PlaceClouds> clouds_in_store(std::shared_ptr<const MapStore> store, std::size_t kept = 256);
 
 }  // namespace revisit
