@@ -99,10 +99,11 @@ class BagRecording final : public Recording {
     const bool has_altitude = std::isfinite(fix.altitude_m);
     if (!has_altitude) fix.altitude_m = 0.0;
     const bool is_known = values.integer("position_covariance_type").value_or(0) > 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double variance = values.number("position_covariance", static_cast<std::size_t>(4 * axis)).value_or(0.0);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double variance = values.number("position_covariance", 4 * axis).value_or(0.0);
       const double unknown = axis == 2 ? 1.7 * kUnknown_m : kUnknown_m;
-      fix.deviation_m[axis] = is_known && variance > 0.0 ? std::max(kLeast_m, std::sqrt(variance)) : unknown;
+      fix.deviation_m[static_cast<Eigen::Index>(axis)] =
+          is_known && variance > 0.0 ? std::max(kLeast_m, std::sqrt(variance)) : unknown;
     }
     if (!has_altitude) fix.deviation_m.z() = kNone_m;
     return fix;
