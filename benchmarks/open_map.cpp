@@ -51,9 +51,8 @@ void write_map(const fs::path& file, std::size_t count, bool is_finished) {
   }
   if (status) status = store.set_map_poses(poses);
   if (status && is_finished)
-    status = index.save([&](std::size_t offset, std::span<const std::byte> piece) {
-      return store.add_index(offset, piece);
-    });
+    status = index.save(
+        [&](std::size_t offset, std::span<const std::byte> piece) { return store.add_index(offset, piece); });
   if (status && is_finished) status = store.set_place_poses(poses);
   if (status) status = store.commit();
   if (status) status = store.close();

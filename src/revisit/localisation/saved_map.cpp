@@ -6,8 +6,7 @@ namespace revisit {
 Result<MapStore> open_map(const std::filesystem::path& path) {
   std::error_code failure;
   const std::filesystem::path file = MapStore::file_of(path);
-  if (!std::filesystem::exists(file, failure))
-    return Error{file.string() + ": no such map; `revisit slam` makes one"};
+  if (!std::filesystem::exists(file, failure)) return Error{file.string() + ": no such map; `revisit slam` makes one"};
   return MapStore::open(file, MapStore::Access::kRead);
 }
 

@@ -45,9 +45,7 @@ class PlaceRecognition {
                const std::optional<TrajectoryPoint>& point);
 
   /// Where a place is, known better by now.
-  void set_point(FrameId place, const TrajectoryPoint& point) {
-    points_.insert_or_assign(points_.end(), place, point);
-  }
+  void set_point(FrameId place, const TrajectoryPoint& point) { points_.insert_or_assign(points_.end(), place, point); }
 
   const PlaceIndex& index() const { return index_; }
   /// How much alike the places are (LookAlikes): as this run learnt, or as the map says.

@@ -130,10 +130,10 @@ class PlaceStore {
   int rings_ = 0, sectors_ = 0, levels_ = 0;  // set before the first place is published
   ChunkLayout layout_;
   std::string path_;
-  MappedFile file_;          ///< either this is where the store was opened,
+  MappedFile file_;  ///< either this is where the store was opened,
   bool is_mapped_ = true;
   mutable std::mutex reading_;
-  Read read_;                ///< or this
+  Read read_;  ///< or this
   std::condition_variable_any stopped_;
   std::jthread background_;  ///< reads the rest; ends before what it reads
 };

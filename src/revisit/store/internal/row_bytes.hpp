@@ -16,7 +16,9 @@ namespace revisit::store_internal {
 
 using store_internal::Statement;
 
-inline std::span<const std::byte> bytes_of(const Matrix6& matrix) { return std::as_bytes(std::span(matrix.data(), 36)); }
+inline std::span<const std::byte> bytes_of(const Matrix6& matrix) {
+  return std::as_bytes(std::span(matrix.data(), 36));
+}
 
 // x y z, then the quaternion x y z w.
 inline std::array<double, 7> numbers_of(const Pose& T) {
