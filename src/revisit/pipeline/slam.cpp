@@ -5,7 +5,7 @@
 
 #include <revisit/core/stopwatch.hpp>
 #include <revisit/core/text.hpp>
-#include <revisit/pipeline/map_upkeep.hpp>
+#include <revisit/pipeline/known_ground.hpp>
 #include <revisit/store/keyframe_bytes.hpp>
 
 namespace revisit {

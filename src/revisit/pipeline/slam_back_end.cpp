@@ -12,7 +12,7 @@
 #include <revisit/core/stopwatch.hpp>
 #include <revisit/core/text.hpp>
 #include <revisit/mapping/earth_frame.hpp>
-#include <revisit/pipeline/map_upkeep.hpp>
+#include <revisit/pipeline/visits.hpp>
 #include <revisit/pose_graph/edge_information.hpp>
 #include <revisit/store/keyframe_bytes.hpp>
 #include <revisit/store/stored_clouds.hpp>
