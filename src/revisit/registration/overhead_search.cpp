@@ -14,6 +14,7 @@ constexpr int kSide = OverheadImage::kSide;
 constexpr int kSteps = 120;  // of the heading, to a whole turn
 constexpr double kStep_rad = 2.0 * kPi / kSteps;
 constexpr std::size_t kWordsARow = kSide / 64;
+constexpr std::size_t kFewestCells = 20;  // that both of two narrow views hold; of fewer, nothing can be said
 
 struct Coarse {
   static constexpr int kSteps = 2, kCells = 2;
@@ -61,6 +62,42 @@ OverheadImage grown(const OverheadImage& image) {
   return result;
 }
 
+OverheadImage moved_along_y(const OverheadImage& image, int cells) {
+  OverheadImage result;
+  const auto away = static_cast<std::ptrdiff_t>(std::abs(cells)) * static_cast<std::ptrdiff_t>(kWordsARow);
+  if (cells >= 0)
+    std::copy(image.bits.begin(), image.bits.end() - away, result.bits.begin() + away);
+  else
+    std::copy(image.bits.begin() + away, image.bits.end(), result.bits.begin());
+  return result;
+}
+
+OverheadImage both(const OverheadImage& a, const OverheadImage& b) {
+  OverheadImage result;
+  for (std::size_t w = 0; w < a.bits.size(); ++w) result.bits[w] = a.bits[w] & b.bits[w];
+  count(result);
+  return result;
+}
+
+// All cells in the sector of a sensor that stands `x`, `y` cells from the middle, turned by `yaw_rad`.
+OverheadImage image_of(const SeenSpace::Sector& sector, double yaw_rad, int x, int y) {
+  OverheadImage image;
+  const Eigen::Matrix2f back = Eigen::Rotation2Df(static_cast<float>(-yaw_rad)).toRotationMatrix();
+  constexpr float kMiddle = 0.5f * kSide - 0.5f;
+  for (int row = 0; row < kSide; ++row)
+    for (int column = 0; column < kSide; ++column) {
+      const Eigen::Vector2f at(static_cast<float>(column - x) - kMiddle, static_cast<float>(row - y) - kMiddle);
+      if (!sector.holds(back * at)) continue;
+      const auto bit = static_cast<std::size_t>(row * kSide + column);
+      image.bits[bit / 64] |= std::uint64_t{1} << (bit % 64);
+    }
+  return image;
+}
+
+double share(std::uint64_t part, std::size_t of) {
+  return static_cast<double>(part) / static_cast<double>(std::max<std::size_t>(1, of));
+}
+
 // Bits set in `fixed` and in `moving` moved by `rows` along y.
 std::uint64_t common(const OverheadImage& fixed, const OverheadImage& moving, int rows) {
   const auto away = static_cast<std::size_t>(std::abs(rows)) * kWordsARow;
@@ -102,12 +139,23 @@ const OverheadImage& OverheadSearch::moved(int step, int x) {
 }
 
 // The overlap, both ways round: the query on the place's grown image, of which `shared` are common, and the other way.
-OverheadMatch OverheadSearch::match_at(const OverheadImage& place, const At& at) {
-  const OverheadImage& query = turned(at.step).image;
-  const std::uint64_t back = common(place, grown(moved(at.step, at.x)), at.y);
-  return {wrap_angle(at.step * kStep_rad), at.x * cell_m_, at.y * cell_m_,
-          std::min(static_cast<double>(at.shared) / static_cast<double>(std::max<std::size_t>(1, query.count)),
-                   static_cast<double>(back) / static_cast<double>(std::max<std::size_t>(1, place.count)))};
+OverheadMatch OverheadSearch::match_at(const OverheadImage& place, const OverheadImage& place_grown, const At& at) {
+  OverheadMatch match{wrap_angle(at.step * kStep_rad), at.x * cell_m_, at.y * cell_m_, 0.0};
+  const OverheadImage& query = moved(at.step, at.x);
+  if (place_sector_.is_all_round() && query_sector_.is_all_round()) {
+    const std::uint64_t back = common(place, grown(query), at.y);
+    match.overlap = std::min(share(at.shared, turned(at.step).image.count), share(back, place.count));
+    return match;
+  }
+  // Of each only what lies where the other one looks.
+  const OverheadImage seen_by_place = image_of(place_sector_, 0.0, 0, 0),
+                      seen_by_query = image_of(query_sector_, match.yaw_rad, at.x, 0);
+  const OverheadImage place_there = both(place, moved_along_y(seen_by_query, at.y)),
+                      query_there = both(moved_along_y(query, at.y), seen_by_place);
+  if (std::min(place_there.count, query_there.count) < kFewestCells) return match;
+  match.overlap = std::min(share(common(place_grown, query_there, 0), query_there.count),
+                           share(common(place_there, grown(moved_along_y(query, at.y)), 0), place_there.count));
+  return match;
 }
 
 // The best of `at` and all that lie one step beside it.
@@ -129,6 +177,7 @@ std::vector<OverheadMatch> OverheadSearch::search(const ThinCloud& match, double
   const auto cell_m = static_cast<double>(std::max(match.voxel_m, query_.voxel_m));
   if (cell_m != cell_m_) turns_.clear();
   cell_m_ = cell_m;
+  place_sector_ = match.seen.sector();
   const OverheadImage place = overhead_image(match, cell_m), place_grown = grown(place);
   const int reach_cells = static_cast<int>(std::lround(reach_m / cell_m));
   const auto nearest = static_cast<int>(std::lround(yaw_rad / kStep_rad));
@@ -155,7 +204,7 @@ std::vector<OverheadMatch> OverheadSearch::search(const ThinCloud& match, double
   std::stable_sort(found.begin(), found.end(), [](const At& a, const At& b) { return a.shared > b.shared; });
   std::vector<OverheadMatch> matches;
   matches.reserve(found.size() + 1);
-  for (const At& each : found) matches.push_back(match_at(place, each));
+  for (const At& each : found) matches.push_back(match_at(place, place_grown, each));
   if (matches.empty()) matches.push_back({wrap_angle(yaw_rad), 0.0, 0.0, 0.0});
   return matches;
 }

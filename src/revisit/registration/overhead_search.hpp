@@ -27,7 +27,8 @@ OverheadImage overhead_image(const ThinCloud& cloud, double cell_m, double yaw_r
 struct OverheadMatch {
   double yaw_rad = 0.0;         ///< heading of the query in the match's frame, both upright
   double x_m = 0.0, y_m = 0.0;  ///< position of the query in the match's upright frame, whole cells
-  double overlap = 0.0;         ///< share of each image that lies on or beside the other's, the smaller of both, [0, 1]
+  double overlap = 0.0;  ///< share of each image that lies on or beside the other's, the smaller of both, [0, 1]; of
+                         ///< sensors that do not see all round, of what lies in the other's sector
 };
 
 /// A query scan laid on places from above, to find where it stands before registration: headings in steps of 3 degrees
@@ -35,7 +36,7 @@ struct OverheadMatch {
 /// its turns are kept from place to place: one object for each thread.
 class OverheadSearch {
  public:
-  explicit OverheadSearch(const ThinCloud& query) : query_(query) {}
+  explicit OverheadSearch(const ThinCloud& query) : query_(query), query_sector_(query.seen.sector()) {}
 
   /// Of all headings within `yaw_reach_rad` of `yaw_rad`, at positions up to `reach_m` (less than 63 cells) along x and
   /// y: the pose at which the scans share most cells, and the next best ones that lie more than 3 cells or 12 degrees
@@ -54,11 +55,12 @@ class OverheadSearch {
   };
   const Turned& turned(int step);
   const OverheadImage& moved(int step, int x);  ///< of a turn that was asked for
-  OverheadMatch match_at(const OverheadImage& place, const At& at);
+  OverheadMatch match_at(const OverheadImage& place, const OverheadImage& place_grown, const At& at);
   At climb(const OverheadImage& place_grown, const At& at);
   static bool is_beside(const At& a, const At& b);
 
   const ThinCloud& query_;
+  SeenSpace::Sector query_sector_, place_sector_;
   double cell_m_ = 0.0;
   std::map<int, Turned> turns_;  ///< in cells of cell_m_
   std::vector<At> coarse_;       ///< of the search at work

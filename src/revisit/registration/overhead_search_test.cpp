@@ -37,6 +37,31 @@ TEST(OverheadSearch, FindsPositionAndHeading) {
   }
 }
 
+// A sensor that looks ahead, laid on one that sees all round, and the other way: only what both see counts.
+TEST(OverheadSearch, ANarrowViewOverlapsWithinItsSector) {
+  const SyntheticWorld world(31);
+  const Pose T_b = SyntheticWorld::at(2.0, -1.0, to_radians(20.0));
+  const ThinCloud round = thin_scan(world, SyntheticWorld::at(0, 0, 0), 1);
+  Scan ahead = world.scan(T_b, {32, 900, -24.8, 5.0}, 2);
+  std::erase_if(ahead.points, [](const Point& p) { return !(p.x > 0.f && std::abs(p.y) < 0.7f * p.x); });
+  std::vector<std::uint8_t> ground;
+  for (const Point& p : ahead.points) ground.push_back(p.z < -1.4f);
+  const ThinCloud narrow = thin(ahead.points, ground, 1.0);
+  ASSERT_TRUE(round.seen.sector().is_all_round());
+  const SeenSpace::Sector sector = narrow.seen.sector();
+  ASSERT_FALSE(sector.is_all_round());
+  EXPECT_TRUE(sector.holds({10.f, 6.f}));
+  EXPECT_FALSE(sector.holds({10.f, 9.f}));
+  EXPECT_FALSE(sector.holds({-10.f, 0.f}));
+  for (const bool query_is_narrow : {true, false}) {
+    OverheadSearch search(query_is_narrow ? narrow : round);
+    const double yaw_rad = to_radians(query_is_narrow ? 20.0 : -20.0);
+    const OverheadMatch found = search.search(query_is_narrow ? round : narrow, yaw_rad, to_radians(9.0), 6).front();
+    EXPECT_NEAR(found.yaw_rad, yaw_rad, to_radians(6.0));
+    EXPECT_GT(found.overlap, 0.6) << query_is_narrow;
+  }
+}
+
 // Four walls: turned by half, a rectangle looks the same.
 TEST(OverheadSearch, ARectangularRoomFitsBothWays) {
   std::vector<Point> room;

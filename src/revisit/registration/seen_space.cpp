@@ -13,6 +13,7 @@ namespace revisit {
 namespace {
 
 constexpr int kAzimuths = 120, kElevations = 30;
+constexpr int kWidestGap = kAzimuths / 4;  // of a sensor that sees all round: what stands close by hides nothing wider
 constexpr auto kCellsARad = static_cast<float>(kAzimuths / (2.0 * kPi));
 
 // Angles in cells, counted from the left and from below.
@@ -72,6 +73,30 @@ SeenSpace::Verdict SeenSpace::look(const Eigen::Vector3f& p, float margin_m) con
   if (range_m < 0.01f * cells_[*cell].nearest_cm - margin_m) return Verdict::kThrough;
   if (range_m > 0.01f * cells_[*cell].farthest_cm + margin_m) return Verdict::kHidden;
   return Verdict::kSurface;
+}
+
+SeenSpace::Sector SeenSpace::sector() const {
+  const auto is_seen = [&](int azimuth) {
+    const auto first = cells_.begin() + std::ptrdiff_t{azimuth % kAzimuths} * kElevations;
+    return std::any_of(first, first + kElevations, [](const Interval& cell) { return cell.farthest_cm > 0; });
+  };
+  // The widest gap, from a column that was seen once round to it again.
+  int first_seen = 0;
+  while (first_seen < kAzimuths && (cells_.empty() || !is_seen(first_seen))) ++first_seen;
+  if (first_seen == kAzimuths) return {};
+  int widest = 0, sector_begins = 0, gap = 0;
+  for (int azimuth = first_seen + 1; azimuth <= first_seen + kAzimuths; ++azimuth) {
+    if (!is_seen(azimuth)) {
+      ++gap;
+      continue;
+    }
+    if (gap > widest) widest = gap, sector_begins = azimuth;
+    gap = 0;
+  }
+  if (widest < kWidestGap) return {};
+  const float half = 0.5f * static_cast<float>(kAzimuths - widest);
+  const float middle_rad = (static_cast<float>(sector_begins) + half) / kCellsARad - static_cast<float>(kPi);
+  return {{std::cos(middle_rad), std::sin(middle_rad)}, std::cos(half / kCellsARad)};
 }
 
 std::vector<std::uint16_t> SeenSpace::ranges_cm() const {

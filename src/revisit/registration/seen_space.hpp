@@ -30,6 +30,16 @@ class SeenSpace {
   /// `p`, finite, in the scan's frame; `margin_m` is what the ranges may be off.
   Verdict look(const Eigen::Vector3f& p, float margin_m) const;
 
+  /// The azimuths that the scan saw, about the LiDAR's z axis: all, unless a quarter turn or more of them is empty.
+  struct Sector {
+    Eigen::Vector2f middle = Eigen::Vector2f::UnitX();  ///< unit vector
+    float least_cosine = -1.f;                          ///< of the angle between it and what was seen
+
+    bool is_all_round() const { return least_cosine <= -1.f; }
+    bool holds(const Eigen::Vector2f& p) const { return is_all_round() || p.dot(middle) >= least_cosine * p.norm(); }
+  };
+  Sector sector() const;
+
   /// Nearest and farthest range of each cell in turn, cm, to be kept; empty where nothing was seen.
   std::vector<std::uint16_t> ranges_cm() const;
   /// Nothing where they are not those of all cells.

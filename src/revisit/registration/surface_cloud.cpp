@@ -58,7 +58,8 @@ SensorView view_of(const ThinCloud& cloud) {
     if (cloud.is_ground[i] == 0) ranges.push_back(p.norm());
     if (const float across_m = p.head<2>().norm(); across_m > 0.f) slopes.push_back(p.z() / across_m);
   }
-  return {nth(ranges, Seeing::kShare), nth(slopes, Seeing::kOutermost), nth(slopes, 1.0 - Seeing::kOutermost)};
+  return {nth(ranges, Seeing::kShare), nth(slopes, Seeing::kOutermost), nth(slopes, 1.0 - Seeing::kOutermost),
+          cloud.seen.sector()};
 }
 
 }  // namespace

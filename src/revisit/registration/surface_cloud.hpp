@@ -41,11 +41,12 @@ ThinCloud thin_surfaces(std::span<const Point> points, std::span<const std::uint
 struct SensorView {
   float farthest_m = 0.f;                         ///< of the points above ground
   float least_slope = 0.f, greatest_slope = 0.f;  ///< height over horizontal range, in the LiDAR's frame
+  SeenSpace::Sector sector;
 
   bool holds(const Eigen::Vector3f& p) const {
     const float across_m = p.head<2>().norm();
     return p.squaredNorm() <= farthest_m * farthest_m && p.z() >= least_slope * across_m &&
-           p.z() <= greatest_slope * across_m;
+           p.z() <= greatest_slope * across_m && sector.holds(p.head<2>());
   }
 };
 

@@ -64,6 +64,7 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
   LoopEvidence& all = evidence.evidence;
   all.inlier_ratio = agreement.inlier_ratio;
   all.sensors_differ = sensors_differ(match.view(), query.view());
+  all.one_is_narrow = match.view().sector.is_all_round() != query.view().sector.is_all_round();
   all.inlier_share =
       agreement.inlier_ratio / (view.typical.inlier_ratio * (all.sensors_differ ? Differing::kShare : 1.0));
   all.free_space_agreement = agreement.free_space_agreement;

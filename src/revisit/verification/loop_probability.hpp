@@ -21,6 +21,7 @@ struct LoopEvidence {
   double least_fixed = 0.0;  ///< how well the surfaces fix the direction that they fix least (Agreement): a slide
   std::size_t inliers = 0;   ///< points, smaller of both directions
   bool sensors_differ = false;  ///< in what they can see; what their intensities have in common is not known then
+  bool one_is_narrow = false;   ///< one of them sees all round, the other one a sector: the rest can contradict nothing
   double distance_m = 0.0;      ///< between both sensors: farther apart, less fits even at the same place
 };
 
