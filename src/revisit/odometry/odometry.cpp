@@ -38,6 +38,12 @@ OdometryStep Odometry::follow(const Scan& scan, const std::optional<Pose>& T_ext
     matcher_.restart();
     untracked_ = 0;
   }
+  if (step.is_tracked && !scan.imu.empty()) {
+    gravity_.add(scan, stamp_s, step.T_odom_lidar);
+    step.up_by_gravity = gravity_.up();
+  } else {
+    gravity_.restart();
+  }
   has_last_ = true;
   last_stamp_s_ = stamp_s;
   T_odom_last_ = step.T_odom_lidar;

@@ -9,6 +9,7 @@
 #include <revisit/core/pose.hpp>
 #include <revisit/core/scan.hpp>
 #include <revisit/core/twist.hpp>
+#include <revisit/odometry/gravity_track.hpp>
 #include <revisit/odometry/scan_matcher.hpp>
 #include <revisit/preprocess/imu_track.hpp>
 
@@ -21,12 +22,14 @@ struct OdometryStep {
   Pose T_previous_lidar = Pose::Identity();  ///< motion since the scan before
   Matrix6 information = Matrix6::Zero();     ///< of that motion, as in LoopConstraint; zero where nothing measured it
   std::optional<Eigen::Vector3f> up;         ///< in the frame of the scan, at its stamp; where an IMU came with it
-  std::optional<Twist> motion;               ///< during the sweep; absent where nothing is known of it
-  bool is_tracked = false;                   ///< otherwise the pose is the predicted one
-  bool is_connected = false;                 ///< tracked, and soon after the scan before: T_previous_lidar is sure
-  bool lost = false;                         ///< tracking ended with this scan: the next one begins a new segment
-  bool stamp_was_replaced = false;           ///< it was not after that of the scan before
-  int segment = 0;                           ///< of the trajectory; between two segments tracking was lost
+  /// Likewise, but from the last four seconds together with odometry's motion: slower, but far more exact.
+  std::optional<Eigen::Vector3f> up_by_gravity;
+  std::optional<Twist> motion;      ///< during the sweep; absent where nothing is known of it
+  bool is_tracked = false;          ///< otherwise the pose is the predicted one
+  bool is_connected = false;        ///< tracked, and soon after the scan before: T_previous_lidar is sure
+  bool lost = false;                ///< tracking ended with this scan: the next one begins a new segment
+  bool stamp_was_replaced = false;  ///< it was not after that of the scan before
+  int segment = 0;                  ///< of the trajectory; between two segments tracking was lost
   /// The points as they would have been seen at the stamp; empty where these are the scan's own.
   std::vector<Point> compensated;
 };
@@ -68,6 +71,7 @@ class Odometry {
   Source source_;
   ScanMatcher matcher_;
   ImuTrack imu_;
+  GravityTrack gravity_;
   bool has_last_ = false;
   double last_stamp_s_ = 0.0;
   Pose T_odom_last_ = Pose::Identity();

@@ -156,6 +156,12 @@ Status Merger::add_scans(const Source& source) {
     fix.keyframe = renumbered(fix.keyframe);
     if (Status added = store_->add(fix); !added) return added;
   }
+  const auto ups = source.store.ups();
+  if (!ups) return ups.error();
+  for (StoredUp up : *ups) {
+    up.keyframe = renumbered(up.keyframe);
+    if (Status added = store_->add(up); !added) return added;
+  }
   const auto scans = source.store.scans();
   if (!scans) return scans.error();
   for (StoredScan scan : *scans) {

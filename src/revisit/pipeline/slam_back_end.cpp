@@ -11,7 +11,7 @@
 
 #include <revisit/core/stopwatch.hpp>
 #include <revisit/core/text.hpp>
-#include <revisit/mapping/earth_frame.hpp>
+#include <revisit/pipeline/settle_map.hpp>
 #include <revisit/pipeline/visits.hpp>
 #include <revisit/pose_graph/edge_information.hpp>
 #include <revisit/store/keyframe_bytes.hpp>
@@ -70,6 +70,8 @@ Result<SlamBackEnd::Added> SlamBackEnd::add_keyframe(PreparedScan scan, const Od
   if (const Status entered = enter_keyframe(std::move(entry), std::move(detection), added); !entered)
     return entered.error();
   if (const Status fixed = add_fix(frame, stamp_s); !fixed) return fixed.error();
+  if (odometry.up_by_gravity)
+    if (const Status added_up = add_up(frame, stamp_s, *odometry.up_by_gravity); !added_up) return added_up.error();
   return added;
 }
 
@@ -209,7 +211,7 @@ Status SlamBackEnd::settle_session() {
 Status SlamBackEnd::finish() {
   std::size_t entered = 0;
   const Status stored = enter(graph_.decide_all(), entered);
-  const Status settled = settle_all();
+  const Status settled = settle_map(*store_, graph_, log_);
   const Status placed = stored && settled ? write_map_poses() : ok();
   const Status compared = stored && settled ? compare_with_visits(*store_, graph_, session_.id) : ok();
   const Status learnt = stored && settled ? learn_look_alikes() : ok();
@@ -246,38 +248,12 @@ Status SlamBackEnd::add_fix(FrameId keyframe, double stamp_s) {
   return store_->add(StoredFix{keyframe, fix});
 }
 
-// The whole graph, on the earth where fixes tell.
-Status SlamBackEnd::settle_all() {
-  const auto fixes = store_->fixes();
-  if (!fixes) return fixes.error();
-  if (fixes->empty()) {
-    const Status settled = graph_.settle();
-    return settled ? store_->set_earth({}) : settled;
-  }
-  // The middle one of each coordinate: a fix that is wrong altogether is no origin.
-  const auto middle = [&](double GpsFix::*member) {
-    std::vector<double> values;
-    values.reserve(fixes->size());
-    for (const StoredFix& each : *fixes) values.push_back(each.fix.*member);
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-    return values[values.size() / 2];
-  };
-  const EarthFrame earth(middle(&GpsFix::latitude_deg), middle(&GpsFix::longitude_deg), middle(&GpsFix::altitude_m));
-  std::vector<KeyframeGraph::Fix> on_earth;
-  on_earth.reserve(fixes->size());
-  for (const StoredFix& each : *fixes)
-    on_earth.push_back({each.keyframe, earth.east_north_up_m(each.fix), each.fix.deviation_m});
-  const auto placed = graph_.settle_on_earth(on_earth);
-  if (!placed) return placed.error();
-  std::vector<StoredEarth> parts;
-  for (const auto& [part, T_earth_map] : *placed)
-    parts.push_back({part, earth.latitude_deg(), earth.longitude_deg(), earth.altitude_m(), T_earth_map});
-  if (parts.empty())
-    log_to(log_, LogLevel::kWarning,
-           "GPS: " + std::to_string(fixes->size()) +
-               " fixes do not tell how the map lies on the earth: too few, or too near "
-               "to each other");
-  return store_->set_earth(parts);
+// Readings are means over seconds: of those that share readings of the accelerometer, one is kept.
+Status SlamBackEnd::add_up(FrameId keyframe, double stamp_s, const Eigen::Vector3f& up) {
+  constexpr double kApart_s = 4.0;
+  if (last_up_s_ && std::abs(stamp_s - *last_up_s_) < kApart_s) return ok();
+  last_up_s_ = stamp_s;
+  return store_->add(StoredUp{keyframe, up.cast<double>().normalized()});
 }
 
 Status SlamBackEnd::set_map_poses() {

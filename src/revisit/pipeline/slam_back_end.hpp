@@ -61,7 +61,7 @@ class SlamBackEnd {
   Status write_map_poses();
   Status set_map_poses();
   Status add_fix(FrameId keyframe, double stamp_s);
-  Status settle_all();
+  Status add_up(FrameId keyframe, double stamp_s, const Eigen::Vector3f& up);
   std::vector<StoredMapPose> poses_of_places() const;
   Status learn_look_alikes();
   Status settle_session();
@@ -70,6 +70,7 @@ class SlamBackEnd {
 
   std::vector<GpsFix> gps_;
   std::optional<Eigen::Vector3d> last_fix_at_m_;  ///< where in the graph the last one was that was kept
+  std::optional<double> last_up_s_;               ///< likewise of gravity, when
   FrameTime time_in_index(const FrameTime& frame);
 
   StoredSession session_;

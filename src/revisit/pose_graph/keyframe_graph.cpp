@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 #include <revisit/pose_graph/earth.hpp>
 
@@ -65,12 +66,18 @@ Status KeyframeGraph::settle_if_due() {
 
 Status KeyframeGraph::settle() { return loops_unsettled_ == 0 ? ok() : optimise(PoseGraph::kExactly); }
 
-Result<std::map<int, Pose>> KeyframeGraph::settle_on_earth(std::span<const Fix> fixes) {
+Result<std::map<int, Pose>> KeyframeGraph::settle_on_earth(std::span<const Fix> fixes, std::span<const Up> ups) {
   if (const Status settled = settle(); !settled) return settled.error();
   std::vector<EarthFix> of_nodes;
   of_nodes.reserve(fixes.size());
   for (const Fix& fix : fixes)
     if (has(fix.keyframe)) of_nodes.push_back({node_of_.at(fix.keyframe), fix.position_m, fix.deviation_m});
+  std::vector<UpReading> readings;
+  readings.reserve(ups.size());
+  for (const Up& up : ups)  // each session has its accelerometer
+    if (has(up.keyframe))
+      readings.push_back({node_of_.at(up.keyframe), up.up, session_of(up.keyframe), part(up.keyframe)});
+  graph_.set_ups(std::move(readings));
   std::vector<int> parts;
   parts.reserve(keyframes_.size());
   for (const FrameId frame : keyframes_) parts.push_back(part(frame));

@@ -48,8 +48,12 @@ class KeyframeGraph {
     FrameId keyframe;
     Eigen::Vector3d position_m = Eigen::Vector3d::Zero(), deviation_m = Eigen::Vector3d::Ones();
   };
-  /// The same as settle(), with these (EarthFix): for each part that they place, T_earth_world.
-  Result<std::map<int, Pose>> settle_on_earth(std::span<const Fix> fixes);
+  struct Up {
+    FrameId keyframe;
+    Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  };
+  /// The same as settle(), with these (EarthFix, UpReading): for each part that fixes place, T_earth_world.
+  Result<std::map<int, Pose>> settle_on_earth(std::span<const Fix> fixes, std::span<const Up> ups);
 
   bool has(FrameId frame) const { return node_of_.contains(frame); }
   const Pose& T_world_lidar(FrameId keyframe) const { return graph_.nodes()[node_of_.at(keyframe)]; }

@@ -8,13 +8,17 @@
 #include <ceres/rotation.h>
 #include <Eigen/Cholesky>
 
+#include <revisit/pose_graph/internal/gravity_terms.hpp>
 #include <revisit/pose_graph/pose_graph.hpp>
 
 namespace revisit {
 namespace {
 
-// Of a right edge the squared error stays below this in 999 of 1000 cases (chi-square, 6 degrees of freedom).
-constexpr double kTruncation = 22.46;
+using pose_graph_internal::GravityTerms;
+
+// Of a right measurement the squared error stays below this in 999 of 1000 cases: chi-square of an edge, with 6 degrees
+// of freedom, and of a reading of gravity, with 2.
+constexpr double kTruncation = 22.46, kTruncationOfUp = 13.82;
 constexpr double kSharpen = 2.0;
 constexpr int kMostRounds = 60, kIterationsARound = 5, kIterationsAtLast = 20;
 
@@ -64,7 +68,8 @@ struct Solved {
   std::string message;
 };
 
-Solved solve(std::vector<Block>& blocks, const std::vector<PoseEdge>& edges, int most_iterations, double settled) {
+Solved solve(std::vector<Block>& blocks, const std::vector<PoseEdge>& edges, GravityTerms& gravity, int most_iterations,
+             double settled) {
   ceres::Problem problem;
   auto* const manifold = new ceres::EigenQuaternionManifold;  // NOLINT(cppcoreguidelines-owning-memory): the problem's
   for (Block& block : blocks) {
@@ -80,6 +85,7 @@ Solved solve(std::vector<Block>& blocks, const std::vector<PoseEdge>& edges, int
     problem.AddResidualBlock(cost, nullptr, blocks[edge.from].t.data(), blocks[edge.from].q.coeffs().data(),
                              blocks[edge.to].t.data(), blocks[edge.to].q.coeffs().data());
   }
+  gravity.add_to(problem, [&](std::size_t node) { return blocks[node].q.coeffs().data(); });
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   options.logging_type = ceres::SILENT;
@@ -92,19 +98,14 @@ Solved solve(std::vector<Block>& blocks, const std::vector<PoseEdge>& edges, int
           static_cast<int>(summary.iterations.size()), summary.message};
 }
 
-}  // namespace
-
-bool PoseGraph::reweigh(const std::function<double(const PoseEdge&)>& squared, double mu) {
-  const double low = mu / (mu + 1.0) * kTruncation, high = (mu + 1.0) / mu * kTruncation;
-  bool is_decided = true;
-  for (PoseEdge& edge : edges_) {
-    if (!edge.is_loop) continue;
-    const double r2 = squared(edge);
-    edge.weight = r2 <= low ? 1.0 : r2 >= high ? 0.0 : std::sqrt(kTruncation / r2 * mu * (mu + 1.0)) - mu;
-    is_decided = is_decided && (r2 <= low || r2 >= high);
-  }
-  return is_decided;
+// What a measurement counts at this convexity, by its squared error as a share of the truncation.
+double weight_at(double error, double mu) {
+  const double low = mu / (mu + 1.0), high = (mu + 1.0) / mu;
+  return error <= low ? 1.0 : error >= high ? 0.0 : std::sqrt(mu * (mu + 1.0) / error) - mu;
 }
+bool is_decided(double error, double mu) { return error <= mu / (mu + 1.0) || error >= (mu + 1.0) / mu; }
+
+}  // namespace
 
 Result<PoseGraph::Report> PoseGraph::optimise(double settled) {
   Report report;
@@ -122,39 +123,54 @@ Result<PoseGraph::Report> PoseGraph::optimise(double settled) {
     T.translation() = blocks[i].t;
     return T;
   };
-  const auto squared = [&](const PoseEdge& edge) { return squared_error(edge, pose(edge.from), pose(edge.to)); };
-
+  GravityTerms gravity(ups_, nodes_);
+  // Of what may be wrong, the squared error as a share of the truncation.
+  const auto for_each_doubtful = [&](const auto& visit) {
+    for (PoseEdge& edge : edges_)
+      if (edge.is_loop) visit(edge.weight, squared_error(edge, pose(edge.from), pose(edge.to)) / kTruncation);
+    for (UpReading& up : ups_) visit(up.weight, gravity.squared_error(up, blocks[up.node].q) / kTruncationOfUp);
+  };
+  const auto worst_of = [&](bool believed_only) {
+    double worst = 0.0;
+    for_each_doubtful([&](double weight, double error) {
+      if (!believed_only || weight > 0.0) worst = std::max(worst, error);
+    });
+    return worst;
+  };
   const auto solve_all = [&](int most_iterations) -> Status {
-    const Solved solved = solve(blocks, edges_, most_iterations, settled);
+    const Solved solved = solve(blocks, edges_, gravity, most_iterations, settled);
     if (!solved.is_usable) return Error{"pose graph of " + std::to_string(nodes_.size()) + " nodes: " + solved.message};
     if (report.iterations == 0) report.cost_before = solved.cost_before;
     report.iterations += solved.iterations;
     report.cost_after = solved.cost_after;
     return ok();
   };
-  // Loops that were refused stay so while the others agree.
-  for (PoseEdge& edge : edges_) edge.weight = edge.is_loop && edge.weight < 0.5 ? 0.0 : 1.0;
+  // What was refused stays so while the others agree.
+  for_each_doubtful([](double& weight, double) { weight = weight < 0.5 ? 0.0 : 1.0; });
   if (const Status status = solve_all(kIterationsAtLast); !status) return status.error();
 
-  double worst = 0.0;
-  for (const PoseEdge& edge : edges_)
-    if (edge.is_loop && edge.weight > 0.0) worst = std::max(worst, squared(edge));
-  if (worst > kTruncation) {
+  if (worst_of(true) > 1.0) {
     // Some contradict: all are tried again, from the poses that these did not bend, and those that cannot be satisfied
     // fade.
     start_over();
-    worst = 0.0;
-    for (const PoseEdge& edge : edges_)
-      if (edge.is_loop) worst = std::max(worst, squared(edge));
-    double mu = kTruncation / std::max(kTruncation, 2.0 * worst - kTruncation);
-    for (int round = 0; round < kMostRounds && !reweigh(squared, mu); ++round, mu *= kSharpen)
+    gravity = GravityTerms(ups_, nodes_);
+    double mu = 1.0 / std::max(1.0, 2.0 * worst_of(false) - 1.0);
+    for (int round = 0; round < kMostRounds; ++round, mu *= kSharpen) {
+      bool all_decided = true;
+      for_each_doubtful([&](double& weight, double error) {
+        weight = weight_at(error, mu);
+        all_decided = all_decided && is_decided(error, mu);
+      });
+      if (all_decided) break;
       if (const Status status = solve_all(kIterationsARound); !status) return status.error();
-    for (PoseEdge& edge : edges_) edge.weight = edge.weight < 0.5 ? 0.0 : 1.0;
+    }
+    for_each_doubtful([](double& weight, double) { weight = weight < 0.5 ? 0.0 : 1.0; });
     if (const Status status = solve_all(kIterationsAtLast); !status) return status.error();
   }
   for (std::size_t i = 0; i < nodes_.size(); ++i) nodes_[i] = pose(i);
-  report.loops_refused = static_cast<std::size_t>(
-      std::count_if(edges_.begin(), edges_.end(), [](const PoseEdge& edge) { return edge.weight < 0.5; }));
+  const auto is_refused = [](const auto& each) { return each.weight < 0.5; };
+  report.loops_refused = static_cast<std::size_t>(std::count_if(edges_.begin(), edges_.end(), is_refused));
+  report.ups_refused = static_cast<std::size_t>(std::count_if(ups_.begin(), ups_.end(), is_refused));
   return report;
 }
 

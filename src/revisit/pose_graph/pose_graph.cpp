@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/pose_graph/pose_graph.hpp>
 
+#include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace revisit {
 
@@ -21,6 +23,17 @@ void PoseGraph::add_edge(const PoseEdge& edge) {
     throw std::invalid_argument("the edge from node " + std::to_string(edge.from) + " to node " +
                                 std::to_string(edge.to) + " is not finite or its information not symmetric");
   edges_.push_back(edge);
+}
+
+void PoseGraph::set_ups(std::vector<UpReading> readings) {
+  constexpr double kLengthOff = 1e-3;
+  for (const UpReading& each : readings)
+    if (each.node >= nodes_.size() || each.sensor < 0 || each.part < 0 ||
+        !(std::abs(each.up.norm() - 1.0) < kLengthOff))
+      throw std::invalid_argument("a reading of gravity at node " + std::to_string(each.node) +
+                                  "; allowed: a unit vector at one of " + std::to_string(nodes_.size()) +
+                                  ", sensor and part from 0");
+  ups_ = std::move(readings);
 }
 
 double squared_error(const PoseEdge& edge, const Pose& T_world_from, const Pose& T_world_to) {

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <functional>
 #include <vector>
 
 #include <revisit/core/pose.hpp>
@@ -21,6 +20,15 @@ struct PoseEdge {
   double weight = 1.0;   ///< [0, 1], how far the last optimisation believed it
 };
 
+/// What an accelerometer said at a node: which way is up, a unit vector in the node's frame.
+struct UpReading {
+  std::size_t node = 0;
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  int sensor = 0;       ///< counted from 0: each is off by a degree or so, always the same way in its frame
+  int part = 0;         ///< of the graph, counted from 0: parts that no edge joins have their own up
+  double weight = 1.0;  ///< [0, 1], how far the last optimisation believed it
+};
+
 /// Poses that hang together by relative measurements. Node 0 stays where it is. Belongs to one thread at a time.
 class PoseGraph {
  public:
@@ -32,18 +40,21 @@ class PoseGraph {
   /// finite and symmetric.
   void add_edge(const PoseEdge& edge);
 
+  /// All readings of gravity. Throws std::invalid_argument as add_edge(), or for an up that is no unit vector.
+  void set_ups(std::vector<UpReading> readings);
+
   const std::vector<Pose>& nodes() const { return nodes_; }
   const std::vector<PoseEdge>& edges() const { return edges_; }
 
   struct Report {
     int iterations = 0;
-    double cost_before = 0.0, cost_after = 0.0;  ///< half the weighted squared errors
-    std::size_t loops_refused = 0;               ///< of weight below one half
+    double cost_before = 0.0, cost_after = 0.0;      ///< half the weighted squared errors
+    std::size_t loops_refused = 0, ups_refused = 0;  ///< of weight below one half
   };
-  /// Moves the nodes to where the measurements agree best. Where loops contradict the rest, these lose their weight, by
-  /// graduated non-convexity with truncated least squares (Yang et al., RA-L 2020); where none does, one solution from
-  /// the poses of before is enough. Settled where a step lowers the cost by a smaller share than `settled`. An error
-  /// where Ceres cannot solve.
+  /// Moves the nodes to where the measurements agree best. Where loops or readings of gravity contradict the rest,
+  /// these lose their weight, by graduated non-convexity with truncated least squares (Yang et al., RA-L 2020); where
+  /// none does, one solution from the poses of before is enough. Settled where a step lowers the cost by a smaller
+  /// share than `settled`. An error where Ceres cannot solve.
   Result<Report> optimise(double settled = kExactly);
   static constexpr double kExactly = 1e-6, kOnline = 1e-3;
 
@@ -52,11 +63,9 @@ class PoseGraph {
   static Result<PoseGraph> read_g2o(const std::filesystem::path& file);
 
  private:
-  // Weights of the loops at this convexity, from their squared errors; whether all are decided.
-  bool reweigh(const std::function<double(const PoseEdge&)>& squared, double mu);
-
   std::vector<Pose> nodes_;
   std::vector<PoseEdge> edges_;
+  std::vector<UpReading> ups_;
 };
 
 /// Squared error of an edge at these poses, in units of its information: of a right edge, chi-square with 6 degrees of

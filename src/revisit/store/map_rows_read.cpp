@@ -136,6 +136,23 @@ Result<std::vector<StoredFix>> MapStore::fixes() const {
   return rows;
 }
 
+Result<std::vector<StoredUp>> MapStore::ups() const {
+  std::vector<StoredUp> rows;
+  Statement statement = database_->prepare("SELECT frame,up,sum=checksum(frame,up) FROM gravity ORDER BY frame");
+  while (statement.step()) {
+    StoredUp row{{statement.integer(0)}};
+    const auto up = statement.bytes(1);
+    bool is_good = statement.integer(2) != 0 && up.size() == 3 * sizeof(double);
+    if (is_good) std::memcpy(row.up.data(), up.data(), up.size());
+    constexpr double kLengthOff = 1e-3;
+    is_good = is_good && std::abs(row.up.norm() - 1.0) < kLengthOff;
+    if (!is_good) return database_->damaged("gravity", row.keyframe.value);
+    rows.push_back(row);
+  }
+  if (const Status status = statement.status(); !status) return status.error();
+  return rows;
+}
+
 Result<std::vector<StoredEarth>> MapStore::earth() const {
   std::vector<StoredEarth> rows;
   Statement statement = database_->prepare(
@@ -260,7 +277,7 @@ Status MapStore::check() const {
   const auto status_of = [](const auto& rows) { return rows ? ok() : Status(rows.error()); };
   for (const Status& status :
        {status_of(sessions()), status_of(keyframes()), status_of(map_poses()), status_of(place_poses()),
-        status_of(scans()), status_of(edges()), status_of(fixes()), status_of(earth())})
+        status_of(scans()), status_of(edges()), status_of(fixes()), status_of(ups()), status_of(earth())})
     if (!status) return status;
   for (const PartTable& table : kParts) {
     Statement statement = database_->prepare(table.count_damaged);

@@ -60,10 +60,10 @@ Status MapStore::remove(std::span<const FrameId> keyframes, std::span<const Join
     if (Status status = list.bind(frame.value).run(); !status) return status;
     list.reset();
   }
-  for (const char* of :
-       {"keyframes WHERE frame", "map_poses WHERE frame", "fixes WHERE frame", "descriptors WHERE frame",
-        "places WHERE frame", "clouds WHERE frame", "changes WHERE frame", "visits WHERE frame", "scans WHERE keyframe",
-        "answers WHERE query", "edges WHERE from_frame", "edges WHERE to_frame"}) {
+  for (const char* of : {"keyframes WHERE frame", "map_poses WHERE frame", "fixes WHERE frame", "gravity WHERE frame",
+                         "descriptors WHERE frame", "places WHERE frame", "clouds WHERE frame", "changes WHERE frame",
+                         "visits WHERE frame", "scans WHERE keyframe", "answers WHERE query", "edges WHERE from_frame",
+                         "edges WHERE to_frame"}) {
     const std::string sql = "DELETE FROM " + std::string(of) + " IN (SELECT frame FROM removed)";
     if (Status status = database_->run(sql.c_str()); !status) return status;
   }
@@ -129,6 +129,14 @@ Status MapStore::add(const StoredFix& fix) {
       .bind(fix.fix.longitude_deg)
       .bind(fix.fix.altitude_m)
       .bind(std::as_bytes(std::span(deviation_m.data(), 3)))
+      .run();
+}
+
+Status MapStore::add(const StoredUp& up) {
+  if (const Status begun = database_->begin(); !begun) return begun;
+  return database_->prepare("INSERT INTO gravity VALUES(?1,?2,checksum(?1,?2))")
+      .bind(up.keyframe.value)
+      .bind(std::as_bytes(std::span(up.up.data(), 3)))
       .run();
 }
 

@@ -41,6 +41,9 @@ CREATE TABLE earth(part INTEGER PRIMARY KEY, latitude_deg REAL NOT NULL, longitu
 CREATE TABLE answers(query INTEGER PRIMARY KEY, match INTEGER, score REAL NOT NULL, accepted INTEGER NOT NULL,
   reason TEXT NOT NULL);
 )";
+constexpr const char* kSinceVersion4 = R"(
+CREATE TABLE gravity(frame INTEGER PRIMARY KEY, up BLOB NOT NULL, sum INTEGER NOT NULL);
+)";
 
 // One session, whose facts were notes; the bytes of a key frame in its row.
 constexpr const char* kFrom2To3 = R"(
@@ -127,7 +130,7 @@ Status add_checksum_function(sqlite3* database, const std::string& file) {
 }
 
 Status create_schema(sqlite3* database, const std::string& file) {
-  return run_all(database, file, "BEGIN;" + std::string(kSchema) + numbers_of_the_file() + "COMMIT;");
+  return run_all(database, file, "BEGIN;" + std::string(kSchema) + kSinceVersion4 + numbers_of_the_file() + "COMMIT;");
 }
 
 Result<int> version_of(sqlite3* database, const std::string& file) {
@@ -150,11 +153,13 @@ Result<int> version_of(sqlite3* database, const std::string& file) {
 Status upgrade(sqlite3* database, const std::string& file, int version) {
   if (version == kVersion) return ok();
   std::string sql = "BEGIN IMMEDIATE;";
-  for (const char* table : kTablesOf2)
-    sql += "ALTER TABLE " + std::string(table) + " RENAME TO old_" + std::string(table) + ";";
-  sql += std::string(kSchema) + kFrom2To3;
-  for (const char* table : kTablesOf2) sql += "DROP TABLE old_" + std::string(table) + ";";
-  sql += numbers_of_the_file() + "COMMIT;";
+  if (version == 2) {
+    for (const char* table : kTablesOf2)
+      sql += "ALTER TABLE " + std::string(table) + " RENAME TO old_" + std::string(table) + ";";
+    sql += std::string(kSchema) + kFrom2To3;
+    for (const char* table : kTablesOf2) sql += "DROP TABLE old_" + std::string(table) + ";";
+  }
+  sql += kSinceVersion4 + numbers_of_the_file() + "COMMIT;";
   Status status = run_all(database, file, sql);
   if (!status && sqlite3_get_autocommit(database) == 0) (void)run_all(database, file, "ROLLBACK");
   return status;

@@ -82,6 +82,22 @@ TEST(MapSchema, AMapOfVersion2IsUpgraded) {
   EXPECT_FALSE(store->note("input")->has_value());
 }
 
+TEST(MapSchema, AMapOfVersion3IsUpgraded) {
+  const fs::path file = map_of_version_2();
+  (void)MapStore::open(file);
+  run_sql(file, "DROP TABLE gravity; PRAGMA user_version=3");
+  auto store = MapStore::open(file);
+  ASSERT_TRUE(store) << store.error().message;
+  EXPECT_EQ(store->keyframes()->size(), 2u);
+  EXPECT_TRUE(store->ups()->empty());
+  ASSERT_TRUE(store->add(StoredUp{{9}, {0.0, 0.6, 0.8}}));
+  ASSERT_TRUE(store->commit());
+  ASSERT_TRUE(store->check()) << store->check().error().message;
+  ASSERT_EQ(store->ups()->size(), 1u);
+  EXPECT_EQ((*store->ups())[0].keyframe, FrameId{9});
+  EXPECT_EQ((*store->ups())[0].up, Eigen::Vector3d(0.0, 0.6, 0.8));
+}
+
 TEST(MapSchema, AMapOfALaterVersionIsRefusedAndLeftAsItIs) {
   const fs::path file = map_of_version_2();
   run_sql(file, "PRAGMA user_version=99");
@@ -97,13 +113,14 @@ TEST(MapSchema, AlteredRowsAreFound) {
        {"UPDATE sessions SET recording='other.bag'", "UPDATE keyframes SET stamp_s=7.5 WHERE frame=9",
         "UPDATE descriptors SET bytes=x'010204'", "UPDATE places SET bytes=x'06'", "UPDATE clouds SET bytes=x''",
         "UPDATE scans SET is_tracked=0", "UPDATE edges SET information=zeroblob(287)||x'01'",
-        "UPDATE edges SET score=1", "UPDATE map_poses SET part=3"}) {
+        "UPDATE edges SET score=1", "UPDATE map_poses SET part=3", "UPDATE gravity SET frame=9"}) {
     const fs::path file = map_of_version_2();
     {
       auto store = MapStore::open(file);
       ASSERT_TRUE(store);
       const StoredMapPose pose{{4}, planar_pose(1, 2, 3), 0};
       ASSERT_TRUE(store->set_map_poses(std::span(&pose, 1)));
+      ASSERT_TRUE(store->add(StoredUp{{4}}));
       ASSERT_TRUE(store->commit());
       ASSERT_TRUE(store->check()) << store->check().error().message;
     }

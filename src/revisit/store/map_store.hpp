@@ -67,6 +67,12 @@ struct StoredFix {
   GpsFix fix;
 };
 
+/// Which way was up at a key frame, as an IMU with it said (OdometryStep::up_by_gravity): a unit vector in its frame.
+struct StoredUp {
+  FrameId keyframe;
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+};
+
 /// How a part of the map lies on the earth: east, north and up of a point of it.
 struct StoredEarth {
   int part = 0;
@@ -100,6 +106,7 @@ class MapStore {
   Status add(const StoredEdge& edge);
   Status add(const CandidateRow& answer);
   Status add(const StoredFix& fix);
+  Status add(const StoredUp& up);
   /// Everything added since the last commit becomes part of the map, or none of it does.
   Status commit();
   /// Of a key frame at a place that was known: what it saw, until the session is finished.
@@ -165,6 +172,7 @@ class MapStore {
   Result<std::vector<CandidateRow>> answers() const;
   /// In the order of their key frames.
   Result<std::vector<StoredFix>> fixes() const;
+  Result<std::vector<StoredUp>> ups() const;
   Result<std::vector<StoredEarth>> earth() const;
   enum class Part { kDescriptor, kPlace, kCloud, kVisit, kChanges };
   /// Empty where the place was known already. An unknown frame is an error.

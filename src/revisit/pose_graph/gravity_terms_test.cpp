@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/pose_graph/pose_graph.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace revisit {
+namespace {
+
+// 400 m out and back on a level road, by an odometry that pitches up by 0.0025 degrees a metre.
+struct PitchingDrive {
+  PoseGraph graph;
+  std::vector<Pose> truth;
+  std::vector<PoseEdge> pending;
+
+  PitchingDrive() {
+    Pose T_first = Pose::Identity();
+    T_first.rotate(Eigen::AngleAxisd(0.1, Eigen::Vector3d(1.0, 1.0, 0.0).normalized()));  // the sensor is tilted
+    Pose T_true = T_first, T_odom = Pose::Identity();
+    Matrix6 information = Matrix6::Identity();
+    information.diagonal() << 1e4, 1e4, 1e4, 8e6, 8e6, 8e6;
+    for (std::size_t i = 0; i < 400; ++i) {
+      truth.push_back(T_true);
+      graph.add_node(T_odom);
+      // Steps are level in the world, in the sensor's frame they are not.
+      Pose on_road = Pose::Identity();
+      on_road.translate(Eigen::Vector3d(2.0, 0.0, 0.0));
+      on_road.rotate(Eigen::AngleAxisd(i >= 200 && i < 220 ? kPi / 20 : 0.0, Eigen::Vector3d::UnitZ()));
+      const Pose step = T_first.inverse() * on_road * T_first;
+      Pose drift = Pose::Identity();
+      drift.rotate(Eigen::AngleAxisd(-to_radians(0.005), Eigen::Vector3d::UnitY()));
+      const Pose measured = step * drift;
+      T_true = T_true * step;
+      T_odom = T_odom * measured;
+      if (i + 1 < 400) pending.push_back({i, i + 1, measured, information});
+    }
+    for (const PoseEdge& edge : pending) graph.add_edge(edge);
+  }
+  std::vector<UpReading> readings(const Eigen::Vector3d& off, int wrong = 0) const {
+    std::vector<UpReading> all;
+    for (std::size_t i = 0; i < truth.size(); i += 10) {
+      Eigen::Vector3d up = truth[i].linear().transpose() * Eigen::Vector3d::UnitZ() + off;
+      if (static_cast<int>(all.size()) % 10 < wrong) up += Eigen::Vector3d(0.2, 0.1, 0.0);
+      all.push_back({i, up.normalized(), 0});
+    }
+    return all;
+  }
+  // Heights that are off, once the first pose is where it is.
+  double worst_m() const {
+    double worst = 0.0;
+    const Pose T_world_odom = truth[0] * graph.nodes()[0].inverse();
+    for (std::size_t i = 0; i < truth.size(); ++i)
+      worst =
+          std::max(worst, std::abs((T_world_odom * graph.nodes()[i]).translation().z() - truth[i].translation().z()));
+    return worst;
+  }
+};
+
+TEST(Gravity, TakesDriftOutOfHeight) {
+  PitchingDrive drive;
+  const double before_m = drive.worst_m();
+  ASSERT_GT(before_m, 2.0);
+  drive.graph.set_ups(drive.readings(Eigen::Vector3d::Zero()));
+  ASSERT_TRUE(drive.graph.optimise());
+  EXPECT_LT(drive.worst_m(), 0.3 * before_m);
+}
+
+TEST(Gravity, AnAccelerometersOwnErrorBendsNothing) {
+  PitchingDrive drive;
+  const double before_m = drive.worst_m();
+  drive.graph.set_ups(drive.readings({0.02, -0.01, 0.0}));
+  ASSERT_TRUE(drive.graph.optimise());
+  EXPECT_LT(drive.worst_m(), 0.3 * before_m);
+}
+
+TEST(Gravity, WrongReadingsLoseTheirWeight) {
+  PitchingDrive drive;
+  const double before_m = drive.worst_m();
+  drive.graph.set_ups(drive.readings(Eigen::Vector3d::Zero(), 1));
+  const auto report = drive.graph.optimise();
+  ASSERT_TRUE(report);
+  EXPECT_EQ(report->ups_refused, 4u);
+  EXPECT_LT(drive.worst_m(), 0.4 * before_m);
+}
+
+}  // namespace
+}  // namespace revisit
