@@ -30,6 +30,7 @@ class FolderRecording final : public Recording {
   std::vector<ScanFile> scans_;
   bool has_times_ = false;
   Trajectory trajectory_, wheel_odometry_;
+  std::vector<GpsFix> gps_;
   std::optional<Pose> T_camera_lidar_;
   fs::path point_values_;  // where times and rings of points may stand
   std::shared_ptr<io_internal::Remarks> remarks_;
@@ -43,6 +44,7 @@ class FolderRecording final : public Recording {
   bool has_wheel_odometry() const override { return !wheel_odometry_.empty(); }
   std::optional<Pose> wheel_pose(std::size_t index) const override { return wheel_odometry_.at(frame(index)); }
   std::optional<Pose> T_camera_lidar() const override { return T_camera_lidar_; }
+  Result<std::vector<GpsFix>> gps_fixes(const std::string&) const override { return gps_; }
 
   Result<Scan> read(std::size_t index) const override {
     const fs::path& file = scans_.at(index).file;
@@ -214,8 +216,8 @@ Status add_kitti_raw(FolderRecording& recording, const fs::path& folder) {
   if (const auto file = folder / "velodyne_points" / "timestamps.txt"; is_present(file))
     if (const Status status = set_stamps(recording, file, io_internal::read_timestamps(file)); !status) return status;
   if (!is_present(folder / "oxts" / "data")) return ok();
-  const auto imu_poses = io_internal::read_oxts(folder / "oxts");
-  if (!imu_poses) return imu_poses.error();
+  const auto oxts = io_internal::read_oxts(folder / "oxts");
+  if (!oxts) return oxts.error();
   Pose T_lidar_imu = Pose::Identity();
   // KITTI keeps the calibration beside the drives of a day.
   const fs::path beside = folder / "calib_imu_to_velo.txt", above = folder / ".." / "calib_imu_to_velo.txt";
@@ -228,12 +230,15 @@ Status add_kitti_raw(FolderRecording& recording, const fs::path& folder) {
            beside.string() + ": missing, and the IMU's poses are not the LiDAR's: they are left out");
     return ok();
   }
-  if (imu_poses->empty()) return ok();
-  const Pose T_first_world = (imu_poses->begin()->second * T_lidar_imu.inverse()).inverse();
+  if (oxts->empty()) return ok();
+  const Pose T_imu_lidar = T_lidar_imu.inverse();
+  const Pose T_first_world = (oxts->begin()->second.T_world_imu * T_imu_lidar).inverse();
   for (const ScanFile& scan : recording.scans_) {
-    const auto found = imu_poses->find(scan.frame);
-    if (found == imu_poses->end()) continue;
-    recording.trajectory_.entries[scan.frame] = {scan.stamp_s, T_first_world * found->second * T_lidar_imu.inverse()};
+    const auto found = oxts->find(scan.frame);
+    if (found == oxts->end()) continue;
+    recording.trajectory_.entries[scan.frame] = {scan.stamp_s, T_first_world * found->second.T_world_imu * T_imu_lidar};
+    recording.gps_.push_back(found->second.fix_of(T_imu_lidar.translation()));
+    recording.gps_.back().stamp_s = scan.stamp_s;
   }
   return ok();
 }

@@ -149,7 +149,20 @@ TEST(Recording, KittiRawTimesAndCalibration) {
   EXPECT_TRUE((*without)->trajectory().empty()) << "poses of the IMU are not the LiDAR's";
   EXPECT_NE(warning.find("calib_imu_to_velo.txt: missing"), std::string::npos);
   std::ofstream(day / "calib_imu_to_velo.txt") << "R: 1 0 0 0 1 0 0 0 1\nT: 0 0 0\n";
-  EXPECT_EQ((*open_recording(folder))->trajectory().entries.size(), 1u) << "KITTI keeps it beside the drives";
+  const auto recording = open_recording(folder);
+  EXPECT_EQ((*recording)->trajectory().entries.size(), 1u) << "KITTI keeps it beside the drives";
+  // The LiDAR stands 2 m ahead of the IMU, which looks north.
+  std::ofstream(day / "calib_imu_to_velo.txt", std::ios::trunc) << "R: 1 0 0 0 1 0 0 0 1\nT: -2 0 0\n";
+  std::ofstream(folder / "oxts" / "data" / "0000000000.txt", std::ios::trunc)
+      << "49 8 110 0 0 1.5707963267948966 "
+      << "0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0.4 0\n";
+  const auto fixes = (*open_recording(folder))->gps_fixes({});
+  ASSERT_TRUE(fixes);
+  ASSERT_EQ(fixes->size(), 1u);
+  EXPECT_NEAR((*fixes)[0].latitude_deg, 49.0 + to_degrees(2.0 / 6378137.0), 1e-9);
+  EXPECT_NEAR((*fixes)[0].longitude_deg, 8.0, 1e-9);
+  EXPECT_DOUBLE_EQ((*fixes)[0].stamp_s, (*recording)->stamp_s(0));
+  EXPECT_EQ((*fixes)[0].deviation_m, Eigen::Vector3d(0.4, 0.4, 0.8));
 }
 
 TEST(Recording, WhatCannotBeLookedAtIsAnErrorNotAnException) {

@@ -3,6 +3,7 @@
 
 #include <csignal>
 #include <fstream>
+#include <optional>
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -97,6 +98,26 @@ TEST(MapStore, SurvivesAKill) {
   ASSERT_EQ(keyframes->size(), 1u);
   EXPECT_EQ((*keyframes)[0].frame, FrameId{1});
   EXPECT_TRUE(store->add(keyframe(2)));
+}
+
+TEST(MapStore, OneWriterAtATimeAndAnyNumberOfReaders) {
+  const auto file = fresh_file("written");
+  std::optional<MapStore> first;
+  {
+    auto created = MapStore::create(file);
+    ASSERT_TRUE(created && created->add(keyframe(1)) && created->commit());
+    first = *std::move(created);
+  }
+  const auto second = MapStore::open(file);
+  ASSERT_FALSE(second);
+  EXPECT_NE(second.error().message.find("another program writes this map"), std::string::npos)
+      << second.error().message;
+  const auto reader = MapStore::open(file, MapStore::Access::kRead);
+  ASSERT_TRUE(reader) << reader.error().message;
+  EXPECT_EQ(reader->keyframes()->size(), 1u);
+  first.reset();
+  EXPECT_TRUE(MapStore::open(file));
+  EXPECT_FALSE(std::filesystem::exists(file.string() + ".lock"));
 }
 
 TEST(MapStore, RefusesWhatIsNoMap) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include <revisit/core/gps_fix.hpp>
 #include <revisit/core/pose.hpp>
 #include <revisit/core/result.hpp>
 #include <revisit/core/scan.hpp>
@@ -22,8 +23,15 @@ Result<Pose> read_kitti_raw_calibration(const std::filesystem::path& file);
 Result<std::vector<double>> read_times(const std::filesystem::path& file);
 Result<std::vector<double>> read_timestamps(const std::filesystem::path& file);
 
-/// The IMU poses of a KITTI raw `oxts` folder, by the number in the file's name, in a local Mercator frame.
-Result<std::map<FrameId, Pose>> read_oxts(const std::filesystem::path& folder);
+/// What KITTI raw's GPS and IMU said of themselves.
+struct Oxts {
+  Pose T_world_imu = Pose::Identity();  ///< in a local Mercator frame: x east, y north
+  GpsFix fix;                           ///< of the IMU, without stamp
+  /// The same of a sensor that stands so in the IMU's frame.
+  GpsFix fix_of(const Eigen::Vector3d& sensor_in_imu_m) const;
+};
+/// The rows of a KITTI raw `oxts` folder, by the number in the file's name.
+Result<std::map<FrameId, Oxts>> read_oxts(const std::filesystem::path& folder);
 
 /// Times and rings that stand beside a scan (`name` is its file's), where there are any.
 Status read_point_values(const std::filesystem::path& folder, const std::filesystem::path& name, Scan& scan);

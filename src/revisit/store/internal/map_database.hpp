@@ -3,11 +3,13 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include <revisit/store/internal/database.hpp>
 #include <revisit/store/internal/map_schema.hpp>
+#include <revisit/store/internal/writer_lock.hpp>
 #include <revisit/store/map_store.hpp>
 
 namespace revisit {
@@ -17,6 +19,7 @@ struct MapStore::Database {
     void operator()(sqlite3* handle) const { sqlite3_close_v2(handle); }
   };
   std::string file;
+  std::optional<store_internal::WriterLock> lock;  // outlives the handle
   std::unique_ptr<sqlite3, Close> handle;
 
   store_internal::Statement prepare(const char* sql) const { return {handle.get(), file, sql}; }
@@ -49,6 +52,11 @@ struct MapStore::Database {
   }
   // A commit is with the system when it returns: it survives the end of the program, whatever ends it.
   Status journal() {
+    if (!file.empty() && !lock) {
+      auto taken = store_internal::WriterLock::take(file);
+      if (!taken) return taken.error();
+      lock.emplace(*std::move(taken));
+    }
     writes = true;
     for (const char* sql : {"PRAGMA journal_mode=WAL", "PRAGMA synchronous=NORMAL", "PRAGMA cache_size=-8000"})
       if (const Status status = run(sql); !status) return status;
@@ -61,8 +69,10 @@ struct MapStore::Database {
     if (is_in_transaction()) (void)run("ROLLBACK");
     // Each step gives a page back.
     for (store_internal::Statement vacuum = prepare("PRAGMA incremental_vacuum"); vacuum.step();) continue;
-    if (const Status status = run("PRAGMA wal_checkpoint(TRUNCATE)"); !status) return status;
-    return run("PRAGMA journal_mode=DELETE");
+    Status ended = run("PRAGMA wal_checkpoint(TRUNCATE)");
+    if (ended) ended = run("PRAGMA journal_mode=DELETE");
+    lock.reset();
+    return ended;
   }
   bool writes = false;
 
