@@ -17,7 +17,8 @@ struct Refusal {
     kTemporallyInconsistent,  ///< the frames before do not match (eq. 11)
     kFewInliers,
     kImprobable,
-    kTooFar,  ///< the relative translation
+    kOneNarrowView,  ///< by one scan, of two sensors of which one sees all round and the other one a sector
+    kTooFar,         ///< the relative translation
   };
   Reason reason = Reason::kNoCandidate;
   double value = 0.0, limit = 0.0;  ///< what was measured, and the bound that it missed; 0 where there is none

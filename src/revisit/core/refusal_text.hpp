@@ -31,6 +31,8 @@ inline std::string to_text(const Refusal& refusal) {
       return format("inlier ratio %.2f below %.2f", value, limit);
     case Reason::kImprobable:
       return format("probability %.3f below %.3f", value, limit);
+    case Reason::kOneNarrowView:
+      return "probability " + format("%.3f", value) + " by one scan of a narrow view: a drive is needed";
     case Reason::kTooFar:
       return format("translation %.1f m above %.1f m", value, limit);
   }

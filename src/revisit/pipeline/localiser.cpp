@@ -18,12 +18,16 @@ namespace {
 
 struct Staying {
   // Of a scan that was registered where it was predicted: it is there unless its own evidence speaks against it.
-  static constexpr double kLeast_log_odds = -3.0;
+  static constexpr double kLeast_log_odds = -3.0, kLeastOfNarrow_log_odds = -8.0;
   static constexpr double kMost_m = 0.6, kMost_mAMetre = 0.03, kMost_deg = 4.0;  ///< from the prediction
   static constexpr double kFar_m = 20.0;   ///< from the nearest place: it has left the map
   static constexpr double kLost_m = 15.0;  ///< travelled without seeing the map
   static constexpr double kLost_s = 6.0;
   static constexpr double kDrift = 0.01;  ///< of odometry, a standard deviation for each metre
+};
+
+struct Waking {
+  static constexpr double kNarrowView_log_odds = 2.0;  ///< what a scan counts at most where one sensor sees a sector
 };
 
 struct Nearby {
@@ -42,6 +46,16 @@ double highest_log_odds(const Detection& detection) {
   for (const Detection::Registered& each : detection.registered)
     highest = std::max(highest, each.evidence.own_log_odds);
   return highest;
+}
+
+// A sector of a street fits elsewhere, too, where nothing can contradict it: one scan never decides.
+void ask_for_more_of_narrow_views(Detection& detection) {
+  if (!detection.loop) return;
+  const auto registered = std::find_if(detection.registered.begin(), detection.registered.end(),
+                                       [&](const auto& each) { return each.match == detection.loop->match; });
+  if (registered == detection.registered.end() || !registered->evidence.evidence.one_is_narrow) return;
+  detection.refusal = Refusal{Refusal::Reason::kOneNarrowView, detection.loop->probability, 0.0};
+  detection.loop.reset();
 }
 
 // What a pose is known to be after so much odometry.
@@ -131,6 +145,7 @@ Result<Localisation> Localiser::locate(Scan scan) {
     }
   }
   if (const Status looked = look_nearby(*prepared, *detection); !looked) return looked.error();
+  ask_for_more_of_narrow_views(*detection);
   Localisation result;
   if (detection->loop) result = found(prepared->scan.frame, *detection->loop);
   result.frame = prepared->scan.frame;
@@ -186,10 +201,13 @@ Result<Localisation> Localiser::follow(Scan scan, const std::optional<Pose>& T_e
 Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const TrajectoryPoint& point) {
   auto detection = recognition_.find(scan, places(), typical_);
   if (!detection) return detection.error();
+  ask_for_more_of_narrow_views(*detection);
   std::vector<PoseBelief::Sighting> sightings;
   for (const Detection::Registered& each : detection->registered)
     sightings.push_back({each.match, map_.part(each.match), map_.T_map_lidar(each.match) * each.evidence.T_match_query,
-                         each.evidence.own_log_odds});
+                         each.evidence.evidence.one_is_narrow
+                             ? std::min(each.evidence.own_log_odds, Waking::kNarrowView_log_odds)
+                             : each.evidence.own_log_odds});
   belief_.add(point, sightings);
   Localisation result;
   result.reason = detection->reason();
@@ -279,7 +297,9 @@ Result<Localisation> Localiser::stay(const PreparedScan& scan, const TrajectoryP
     if (tested->geometric) {
       const GeometricEvidence& evidence = *tested->geometric;
       const Pose off = prediction->T_match_query.inverse() * evidence.T_match_query;
-      if (evidence.own_log_odds >= Staying::kLeast_log_odds &&
+      const double least =
+          evidence.evidence.one_is_narrow ? Staying::kLeastOfNarrow_log_odds : Staying::kLeast_log_odds;
+      if (evidence.own_log_odds >= least &&
           off.translation().norm() <= Staying::kMost_m + Staying::kMost_mAMetre * travelled_m &&
           rotation_angle(off) <= to_radians(Staying::kMost_deg)) {
         result.status = Localisation::Status::kFollowed;

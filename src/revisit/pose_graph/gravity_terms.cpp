@@ -8,8 +8,6 @@ namespace revisit::pose_graph_internal {
 namespace {
 
 struct Gravity {
-  /// Of a reading, beside what its accelerometer is off: simulated ones are off by less (docs/slam.md).
-  static constexpr double kDeviation_deg = 0.2;
   static constexpr double kOff_deg = 1.0;  ///< of accelerometers: data sheets say 20 to 150 mg/9.8, mounting as much
 };
 
@@ -57,7 +55,7 @@ void GravityTerms::add_to(ceres::Problem& problem, const std::function<double*(s
     if (each.weight <= 0.0) continue;
     double* const up = up_[at(each.part)].data();
     double* const off = off_[at(each.sensor)].data();
-    const double root = std::sqrt(each.weight) / to_radians(Gravity::kDeviation_deg);
+    const double root = std::sqrt(each.weight) / each.deviation_rad;
     problem.AddResidualBlock(new ceres::AutoDiffCostFunction<UpError, 3, 4, 3, 3>(new UpError{each.up, root}), nullptr,
                              rotation_of(each.node), up, off);
     if (!has_part[at(each.part)]) problem.SetManifold(up, new ceres::SphereManifold<3>);
@@ -70,7 +68,7 @@ void GravityTerms::add_to(ceres::Problem& problem, const std::function<double*(s
 
 double GravityTerms::squared_error(const UpReading& reading, const Eigen::Quaterniond& q_world_node) const {
   const Eigen::Vector3d off = q_world_node * (reading.up - off_[at(reading.sensor)]) - up_[at(reading.part)];
-  return off.squaredNorm() / std::pow(to_radians(Gravity::kDeviation_deg), 2);
+  return off.squaredNorm() / std::pow(reading.deviation_rad, 2);
 }
 
 }  // namespace revisit::pose_graph_internal

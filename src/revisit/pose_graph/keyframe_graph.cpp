@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <revisit/pose_graph/earth.hpp>
+#include <revisit/pose_graph/gravity.hpp>
 
 namespace revisit {
 namespace {
@@ -67,7 +68,8 @@ Status KeyframeGraph::settle_if_due() {
 Status KeyframeGraph::settle() { return loops_unsettled_ == 0 ? ok() : optimise(PoseGraph::kExactly); }
 
 Result<std::map<int, Pose>> KeyframeGraph::settle_on_earth(std::span<const Fix> fixes, std::span<const Up> ups) {
-  if (const Status settled = settle(); !settled) return settled.error();
+  graph_.set_ups({});  // first by odometry and loops alone
+  if (const Status settled = optimise(PoseGraph::kExactly); !settled) return settled.error();
   std::vector<EarthFix> of_nodes;
   of_nodes.reserve(fixes.size());
   for (const Fix& fix : fixes)
@@ -77,6 +79,7 @@ Result<std::map<int, Pose>> KeyframeGraph::settle_on_earth(std::span<const Fix> 
   for (const Up& up : ups)  // each session has its accelerometer
     if (has(up.keyframe))
       readings.push_back({node_of_.at(up.keyframe), up.up, session_of(up.keyframe), part(up.keyframe)});
+  weigh_ups(graph_, readings);
   graph_.set_ups(std::move(readings));
   std::vector<int> parts;
   parts.reserve(keyframes_.size());

@@ -28,7 +28,7 @@ void PoseGraph::add_edge(const PoseEdge& edge) {
 void PoseGraph::set_ups(std::vector<UpReading> readings) {
   constexpr double kLengthOff = 1e-3;
   for (const UpReading& each : readings)
-    if (each.node >= nodes_.size() || each.sensor < 0 || each.part < 0 ||
+    if (each.node >= nodes_.size() || each.sensor < 0 || each.part < 0 || !(each.deviation_rad > 0.0) ||
         !(std::abs(each.up.norm() - 1.0) < kLengthOff))
       throw std::invalid_argument("a reading of gravity at node " + std::to_string(each.node) +
                                   "; allowed: a unit vector at one of " + std::to_string(nodes_.size()) +

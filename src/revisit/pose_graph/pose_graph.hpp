@@ -24,9 +24,10 @@ struct PoseEdge {
 struct UpReading {
   std::size_t node = 0;
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
-  int sensor = 0;       ///< counted from 0: each is off by a degree or so, always the same way in its frame
-  int part = 0;         ///< of the graph, counted from 0: parts that no edge joins have their own up
-  double weight = 1.0;  ///< [0, 1], how far the last optimisation believed it
+  int sensor = 0;                 ///< counted from 0: each is off by a degree or so, always the same way in its frame
+  int part = 0;                   ///< of the graph, counted from 0: parts that no edge joins have their own up
+  double deviation_rad = 0.0035;  ///< standard deviation, beside what the accelerometer is off (weigh_ups)
+  double weight = 1.0;            ///< [0, 1], how far the last optimisation believed it
 };
 
 /// Poses that hang together by relative measurements. Node 0 stays where it is. Belongs to one thread at a time.

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <revisit/pose_graph/pose_graph.hpp>
+#include <revisit/pose_graph/gravity.hpp>
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -83,6 +84,29 @@ TEST(Gravity, WrongReadingsLoseTheirWeight) {
   ASSERT_TRUE(report);
   EXPECT_EQ(report->ups_refused, 4u);
   EXPECT_LT(drive.worst_m(), 0.4 * before_m);
+}
+
+// Readings that are off by half a degree each, of a graph that drifts, and of one that does not.
+TEST(Gravity, CountsWhereTheGraphDriftsMoreThanTheReadingsVary) {
+  for (const bool drifts : {true, false}) {
+    PitchingDrive drive;
+    if (!drifts)
+      for (std::size_t i = 0; i < drive.truth.size(); ++i)
+        drive.graph.move_node(i, drive.truth[0].inverse() * drive.truth[i]);
+    std::mt19937 random(7);
+    std::normal_distribution<double> noise(0.0, to_radians(0.3));
+    auto readings = drive.readings(Eigen::Vector3d(0.01, 0.0, 0.0));
+    for (UpReading& each : readings)
+      each.up = (each.up + Eigen::Vector3d(noise(random), noise(random), 0.0)).normalized();
+    weigh_ups(drive.graph, readings);
+    const double deviation_deg = to_degrees(readings[0].deviation_rad);
+    if (drifts) {
+      EXPECT_GT(deviation_deg, 0.15);
+      EXPECT_LT(deviation_deg, 1.0);
+    } else {
+      EXPECT_GT(deviation_deg, 5.0);
+    }
+  }
 }
 
 }  // namespace
