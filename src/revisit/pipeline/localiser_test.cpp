@@ -41,6 +41,34 @@ fs::path small_map() {
   return folder;
 }
 
+// A sensor that looks ahead, in the map of one that sees all round.
+TEST(Localiser, ANarrowViewIsFoundByADriveNotByOneScan) {
+  const fs::path map = small_map();
+  auto localiser = Localiser::open(map);
+  ASSERT_TRUE(localiser) << localiser.error().message;
+  std::size_t in_sight = 0, found = 0;
+  for (int i = 0; i < 40; ++i) {
+    Scan scan = town().scan(pose_at(i), kSensor, static_cast<unsigned>(700 + i));
+    std::erase_if(scan.points, [](const Point& p) { return !(p.x > 0.f && std::abs(p.y) < p.x); });
+    scan.rings.clear();
+    scan.times_s.clear();
+    scan.frame = FrameId{i};
+    scan.stamp_s = 0.1 * i;
+    const auto alone = localiser->locate(scan);
+    ASSERT_TRUE(alone) << alone.error().message;
+    EXPECT_FALSE(alone->T_map_lidar) << i;
+    if (alone->reason.find("a drive is needed") != std::string::npos) ++in_sight;
+    const auto step = localiser->follow(std::move(scan));
+    ASSERT_TRUE(step) << step.error().message;
+    if (!step->T_map_lidar) continue;
+    ++found;
+    const Pose error = (pose_at(0).inverse() * pose_at(i)).inverse() * *step->T_map_lidar;
+    EXPECT_LT(error.translation().norm(), 0.3) << i;
+  }
+  EXPECT_GT(in_sight, 5u);
+  EXPECT_GT(found, 15u);
+}
+
 TEST(Localiser, OneScanAnswersFromTheMapOfAnEarlierRun) {
   const fs::path map = small_map();
   auto localiser = Localiser::open(map);

@@ -37,6 +37,7 @@ TEST(LoopProbability, EachPieceOfEvidenceCounts) {
     return loop_log_odds(evidence);
   };
   EXPECT_LT(after([](LoopEvidence& e) { e.inlier_share -= 0.1; }), before);
+  EXPECT_LT(after([](LoopEvidence& e) { e.one_is_narrow = true; }), before);
   EXPECT_LT(after([](LoopEvidence& e) { e.free_space_agreement -= 0.02; }), before);
   EXPECT_LT(after([](LoopEvidence& e) { *e.intensity_agreement -= 0.1; }), before);
   EXPECT_LT(after([](LoopEvidence& e) { e.rmse_m += 0.02; }), before);
