@@ -110,12 +110,13 @@ Result<std::shared_ptr<MapStore>> open_store(const SlamOptions& options) {
   }
   const fs::path file = MapStore::file_of(options.out);
   const bool exists = fs::exists(file, failure);
-  if (exists && options.overwrite && !options.resume)
-    for (const char* ending : {"", "-wal", "-shm"}) fs::remove(file.string() + ending, failure);
-  else if (exists && !options.resume)
+  if (exists && options.overwrite && !options.resume) {
+    if (const Status removed = MapStore::remove_file(file); !removed) return removed.error();
+  } else if (exists && !options.resume) {
     return Error{options.out +
                  ": already holds a map; continue it with --resume, replace it with --overwrite, or name another "
                  "folder"};
+  }
   return shared(fs::exists(file, failure) ? MapStore::open(file)
                                           : MapStore::create(fs::path(options.out) / MapStore::kFileName));
 }

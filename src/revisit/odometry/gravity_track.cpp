@@ -13,6 +13,8 @@ struct Gravity {
   static constexpr double kWindow_s = 4.0;
   static constexpr double kLongestInterval_s = 0.5;  ///< between two scans
   static constexpr int kFewestReadings = 3;          ///< of an interval
+  static constexpr double kMargin = 0.2;             ///< of an interval, at either end, that may be without
+  static constexpr double kFarthest_s = 1.0;         ///< readings from the scan that they come with
   static constexpr double k_mps2 = 9.81;
   static constexpr double kUnit_mps2 = 3.0;  ///< what is smaller than this was given in units of gravity
   static constexpr double kMostOff = 0.05;   ///< of its length: what is farther off was no gravity
@@ -29,7 +31,9 @@ void GravityTrack::restart() {
 void GravityTrack::add(const Scan& scan, double stamp_s, const Pose& T_odom_lidar) {
   for (const ImuSample& sample : scan.imu) {
     const Felt felt{stamp_s + sample.time_s, sample.acceleration_mps2.cast<double>()};
-    if (felt.acceleration.allFinite() && (felt_.empty() || felt.stamp_s > felt_.back().stamp_s)) felt_.push_back(felt);
+    const bool is_near = std::abs(sample.time_s) < Gravity::kFarthest_s;  // not so where it is not finite
+    if (is_near && felt.acceleration.allFinite() && (felt_.empty() || felt.stamp_s > felt_.back().stamp_s))
+      felt_.push_back(felt);
   }
   if (last_stamp_s_) {
     const double length_s = stamp_s - *last_stamp_s_;
@@ -52,13 +56,17 @@ std::optional<Eigen::Vector3d> GravityTrack::mean_felt(double stamp_s, const Pos
   const double length_s = stamp_s - *last_stamp_s_;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   int count = 0;
+  double first = 1.0, last = 0.0;
   for (const Felt& each : felt_) {
     const double share = (each.stamp_s - *last_stamp_s_) / length_s;
     if (share <= 0.0 || share > 1.0) continue;
     sum += from.slerp(share, to) * each.acceleration;
+    first = std::min(first, share);
+    last = std::max(last, share);
     ++count;
   }
-  if (count < Gravity::kFewestReadings) return std::nullopt;
+  const bool covers = first < Gravity::kMargin && last > 1.0 - Gravity::kMargin;
+  if (count < Gravity::kFewestReadings || !covers) return std::nullopt;
   return sum / count;
 }
 

@@ -38,7 +38,7 @@ OdometryStep Odometry::follow(const Scan& scan, const std::optional<Pose>& T_ext
     matcher_.restart();
     untracked_ = 0;
   }
-  if (step.is_tracked && !scan.imu.empty()) {
+  if (step.is_tracked && is_late && !scan.imu.empty()) {
     gravity_.add(scan, stamp_s, step.T_odom_lidar);
     step.up_by_gravity = gravity_.up();
   } else {

@@ -42,6 +42,7 @@ std::unique_ptr<Slam> drive(const fs::path& folder, const PoseOf& pose_of, int w
     Scan scan = town.scan(pose_of(i), kSixteenLines, static_cast<unsigned>(world * 1000 + i));
     scan.frame = FrameId{i};
     scan.stamp_s = 0.1 * i;
+    for (int k = -9; k <= 0; ++k) scan.imu.push_back({0.01 * k, Eigen::Vector3f::Zero(), {0.f, 0.f, 9.81f}});
     EXPECT_TRUE(slam->process(std::move(scan)));
   }
   EXPECT_TRUE(slam->finish());
@@ -134,6 +135,8 @@ TEST(MapSessions, KnownGroundAddsNothingForGood) {
     }
     keyframes_before = visit->graph().keyframes().size();
     EXPECT_EQ(visit->trajectories()->corrected.entries.size(), std::size_t{kSessionScans});
+    const auto ups = visit->store().ups();
+    for (const StoredUp& each : *ups) EXPECT_TRUE(visit->graph().has(each.keyframe)) << session;
   }
   const auto map = SavedMap::open(folder);
   ASSERT_TRUE(map) << map.error().message;
@@ -200,6 +203,9 @@ TEST(MergeMaps, JoinsWhatBelongsTogetherAndNothingElse) {
   EXPECT_TRUE(map->store()->check());
   EXPECT_LT(off_m(*map, 0, there, 2, back), 0.3);
   EXPECT_EQ(map->store()->scans()->size(), 3u * kSessionScans);
+  const auto ups = map->store()->ups();
+  ASSERT_EQ(ups->size(), 3u) << "where gravity pulled comes along";
+  for (int session = 0; session < 3; ++session) EXPECT_EQ(session_of((*ups)[session].keyframe), session);
 
   EXPECT_FALSE(merge_maps(maps, out)) << "exists already";
 }

@@ -208,7 +208,7 @@ Result<MergeReport> merge_maps(std::span<const fs::path> maps, const fs::path& o
   const auto remove_partial = [&] {
     for (const char* ending : {"", "-wal", "-shm"}) fs::remove(partial.string() + ending, failure);
   };
-  remove_partial();
+  if (const Status removed = MapStore::remove_file(partial); !removed) return removed.error();
   auto store = MapStore::create(partial);
   if (!store) return store.error();
   Result<MergeReport> report = Error{};

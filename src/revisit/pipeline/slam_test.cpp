@@ -189,6 +189,24 @@ TEST(Slam, GoesOnWhereAKillLeftIt) {
   EXPECT_EQ(drive.slam->trajectories()->corrected.entries.size(), std::size_t{kScans});
 }
 
+TEST(Slam, KeepsWhereAnAccelerometerFeelsUp) {
+  Drive drive("gravity");
+  const Eigen::Vector3f up = Eigen::Vector3f(0.1f, -0.05f, 1.f).normalized();  // it is mounted so
+  for (int i = 0; i < kOut; ++i) {
+    Scan scan = scan_at(i);
+    for (int k = -9; k <= 0; ++k) scan.imu.push_back({0.01 * k, Eigen::Vector3f::Zero(), 9.81f * up});
+    drive.feed(std::move(scan));
+  }
+  ASSERT_TRUE(drive.slam->finish());
+  const auto ups = drive.slam->store().ups();
+  ASSERT_TRUE(ups);
+  ASSERT_EQ(ups->size(), 2u) << "9 s: one reading in four";
+  for (const StoredUp& each : *ups) {
+    EXPECT_LT((each.up - up.cast<double>()).norm(), 0.01) << each.up.transpose();
+    EXPECT_TRUE(drive.slam->graph().has(each.keyframe));
+  }
+}
+
 TEST(Slam, TakesAnotherOdometryAsItIs) {
   const auto file = std::filesystem::path(testing::TempDir()) / "revisit_slam_external.map";
   for (const char* ending : {"", "-wal", "-shm"}) std::filesystem::remove(file.string() + ending);

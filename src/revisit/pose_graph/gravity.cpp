@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include <Eigen/LU>
@@ -13,8 +14,9 @@ namespace {
 
 struct Weighing {
   static constexpr int kRounds = 20;  ///< until both settle: where up is, and how much the sensor is off
-  static constexpr std::size_t kFewest = 16;
-  static constexpr double kShows = 1.5;  ///< as much as distant readings must differ more than neighbours, if it drifts
+  static constexpr std::size_t kFewest = 32;
+  /// Distant readings must differ by so much more than noise, in deviations of what few of them show, if it drifts.
+  static constexpr double kShows = 6.0;
   static constexpr double kLeast_deg = 0.05, kMost_deg = 10.0;
   static constexpr double kMedianOfSquares = 1.386;  ///< of two coordinates, in variances (chi-square)
 };
@@ -53,11 +55,28 @@ Vectors errors_of(const PoseGraph& graph, const std::vector<const UpReading*>& r
   return errors;
 }
 
-// Of one coordinate of the difference between errors that lie `lag` readings apart.
-double variance_at(const Vectors& errors, std::size_t lag) {
+// Of one coordinate of these vectors, most of which are noise.
+double variance_of(const Vectors& vectors) {
   std::vector<double> squares;
-  for (std::size_t i = lag; i < errors.size(); ++i) squares.push_back((errors[i] - errors[i - lag]).squaredNorm());
+  squares.reserve(vectors.size());
+  for (const Eigen::Vector3d& each : vectors) squares.push_back(each.squaredNorm());
   return median(std::move(squares)) / Weighing::kMedianOfSquares;
+}
+
+// How much errors that lie `lag` readings apart differ.
+double variance_at(const Vectors& errors, std::size_t lag) {
+  Vectors differences;
+  for (std::size_t i = lag; i < errors.size(); ++i) differences.push_back(errors[i] - errors[i - lag]);
+  return variance_of(differences);
+}
+
+// How much a reading is off from its neighbours' middle: drift, which is even over three of them, falls out.
+double noise_of(const Vectors& errors) {
+  constexpr double kVariances = 1.0 + 4.0 + 1.0;
+  Vectors second_differences;
+  for (std::size_t i = 2; i < errors.size(); ++i)
+    second_differences.push_back(errors[i] - 2.0 * errors[i - 1] + errors[i - 2]);
+  return variance_of(second_differences) / kVariances;
 }
 
 // What edges from one node to the next say that roll and pitch vary: summed up to each node.
@@ -75,27 +94,33 @@ double deviation_of(const PoseGraph& graph, const std::vector<const UpReading*>&
   constexpr double kMost = Weighing::kMost_deg;
   if (readings.size() < Weighing::kFewest) return to_radians(kMost);
   const Vectors errors = errors_of(graph, readings);
-  const std::size_t lag = errors.size() / 2;
-  const double near = variance_at(errors, 1), far = variance_at(errors, lag);
-  if (far < Weighing::kShows * near) return to_radians(kMost);
-  const double drift = (far - near) / static_cast<double>(lag - 1);
-  const double noise = std::max(std::pow(to_radians(Weighing::kLeast_deg), 2), 0.5 * (near - drift));
-  std::vector<double> said;
-  for (std::size_t i = 1; i < readings.size(); ++i)
-    said.push_back(std::abs(edges[readings[i]->node] - edges[readings[i - 1]->node]));
-  const double less = std::max(1.0, median(std::move(said)) / drift);
-  return std::min(to_radians(kMost), std::sqrt(noise * less));
+  const double noise = std::max(std::pow(to_radians(Weighing::kLeast_deg), 2), noise_of(errors));
+  // Of a drive that turns round, the halves may drift alike.
+  for (const std::size_t lag : {errors.size() / 2, errors.size() / 4}) {
+    const double far = variance_at(errors, lag);
+    const double least = 2.0 * noise * (1.0 + Weighing::kShows / std::sqrt(static_cast<double>(errors.size() - lag)));
+    if (far < least) continue;
+    std::vector<double> said;
+    for (std::size_t i = lag; i < readings.size(); ++i)
+      said.push_back(std::abs(edges[readings[i]->node] - edges[readings[i - lag]->node]));
+    const double less = std::max(1.0, median(std::move(said)) / (far - 2.0 * noise));
+    return std::min(to_radians(kMost), std::sqrt(noise * less));
+  }
+  return to_radians(kMost);
 }
 
 }  // namespace
 
 void weigh_ups(const PoseGraph& graph, std::span<UpReading> readings) {
   const std::vector<double> edges = variance_of_edges(graph);
-  std::map<int, std::vector<const UpReading*>> of_sensor;
-  for (const UpReading& each : readings) of_sensor[each.sensor].push_back(&each);
-  std::map<int, double> deviation_rad;
-  for (const auto& [sensor, its] : of_sensor) deviation_rad[sensor] = deviation_of(graph, its, edges);
-  for (UpReading& each : readings) each.deviation_rad = deviation_rad.at(each.sensor);
+  // How parts are tilted to each other is not known.
+  using Source = std::pair<int, int>;
+  const auto source_of = [](const UpReading& each) { return Source(each.sensor, each.part); };
+  std::map<Source, std::vector<const UpReading*>> of_source;
+  for (const UpReading& each : readings) of_source[source_of(each)].push_back(&each);
+  std::map<Source, double> deviation_rad;
+  for (const auto& [source, its] : of_source) deviation_rad[source] = deviation_of(graph, its, edges);
+  for (UpReading& each : readings) each.deviation_rad = deviation_rad.at(source_of(each));
 }
 
 }  // namespace revisit

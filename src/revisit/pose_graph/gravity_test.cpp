@@ -39,9 +39,9 @@ struct PitchingDrive {
     }
     for (const PoseEdge& edge : pending) graph.add_edge(edge);
   }
-  std::vector<UpReading> readings(const Eigen::Vector3d& off, int wrong = 0) const {
+  std::vector<UpReading> readings(const Eigen::Vector3d& off, int wrong = 0, std::size_t every = 10) const {
     std::vector<UpReading> all;
-    for (std::size_t i = 0; i < truth.size(); i += 10) {
+    for (std::size_t i = 0; i < truth.size(); i += every) {
       Eigen::Vector3d up = truth[i].linear().transpose() * Eigen::Vector3d::UnitZ() + off;
       if (static_cast<int>(all.size()) % 10 < wrong) up += Eigen::Vector3d(0.2, 0.1, 0.0);
       all.push_back({i, up.normalized(), 0});
@@ -86,6 +86,45 @@ TEST(Gravity, WrongReadingsLoseTheirWeight) {
   EXPECT_LT(drive.worst_m(), 0.4 * before_m);
 }
 
+// Readings with noise of 0.3 degrees, along a drive whose pitch drifts evenly by so much from one to the next.
+double deviation_deg(std::size_t count, double drift_deg, double step_between_halves_deg, unsigned seed) {
+  PoseGraph graph;
+  std::vector<UpReading> readings;
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0.0, to_radians(0.3));
+  Matrix6 information = Matrix6::Identity();
+  information.diagonal().tail<3>().setConstant(std::pow(to_radians(0.05), -2));
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool is_second = step_between_halves_deg > 0.0 && i >= count / 2;
+    Pose T = Pose::Identity();
+    T.rotate(
+        Eigen::AngleAxisd(to_radians(drift_deg * static_cast<double>(i) + (is_second ? step_between_halves_deg : 0.0)),
+                          Eigen::Vector3d::UnitY()));
+    graph.add_node(T);
+    if (i > 0) graph.add_edge({i - 1, i, Pose::Identity(), information});
+    readings.push_back({i, Eigen::Vector3d(noise(random), noise(random), 1.0).normalized(), 0, is_second ? 1 : 0});
+  }
+  weigh_ups(graph, readings);
+  return to_degrees(readings[0].deviation_rad);
+}
+
+TEST(Gravity, NoiseIsToldFromEvenDrift) {
+  for (const std::size_t count : {40u, 200u, 400u})
+    for (const double drift_deg : {0.1, 0.2}) {
+      const double deviation = deviation_deg(count, drift_deg, 0.0, 3);
+      EXPECT_GT(deviation, 0.2) << count << " " << drift_deg;
+      EXPECT_LT(deviation, 0.6) << count << " " << drift_deg;
+    }
+}
+
+TEST(Gravity, PartsThatLieTiltedToEachOtherDoNotDrift) { EXPECT_GT(deviation_deg(120, 0.0, 4.0, 4), 3.0); }
+
+TEST(Gravity, FewReadingsRarelyShowDriftWhereThereIsNone) {
+  int trusted = 0;
+  for (unsigned seed = 0; seed < 100; ++seed) trusted += deviation_deg(36, 0.0, 0.0, seed) < 2.0;
+  EXPECT_LE(trusted, 5);
+}
+
 // Readings that are off by half a degree each, of a graph that drifts, and of one that does not.
 TEST(Gravity, CountsWhereTheGraphDriftsMoreThanTheReadingsVary) {
   for (const bool drifts : {true, false}) {
@@ -95,7 +134,7 @@ TEST(Gravity, CountsWhereTheGraphDriftsMoreThanTheReadingsVary) {
         drive.graph.move_node(i, drive.truth[0].inverse() * drive.truth[i]);
     std::mt19937 random(7);
     std::normal_distribution<double> noise(0.0, to_radians(0.3));
-    auto readings = drive.readings(Eigen::Vector3d(0.01, 0.0, 0.0));
+    auto readings = drive.readings(Eigen::Vector3d(0.01, 0.0, 0.0), 0, 2);
     for (UpReading& each : readings)
       each.up = (each.up + Eigen::Vector3d(noise(random), noise(random), 0.0)).normalized();
     weigh_ups(drive.graph, readings);

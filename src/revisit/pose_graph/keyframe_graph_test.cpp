@@ -74,6 +74,34 @@ TEST(KeyframeGraph, ASegmentIsAttachedByALoopIntoWhatWasBefore) {
   EXPECT_FALSE(drive.graph.last_attached());
 }
 
+// Two sessions along one level road, 1 m a key frame, whose odometry pitches evenly; each has its accelerometer, which
+// is off by its own. Gravity takes the drift out of the height, and neither offset bends the road.
+TEST(KeyframeGraph, GravityOfTwoSessions) {
+  constexpr int kOfSession = 200, kAll = 2 * kOfSession;
+  const auto frame_of = [](int i) { return in_map(i / kOfSession, {i}); };
+  Pose step = planar_pose(1.0, 0.0, 0.0);
+  step.rotate(Eigen::AngleAxisd(-to_radians(0.01), Eigen::Vector3d::UnitY()));
+  Matrix6 information = Matrix6::Identity();
+  information.diagonal() << 1e4, 1e4, 1e4, 8e6, 8e6, 8e6;
+  KeyframeGraph graph;
+  TrajectoryPoint point;
+  std::vector<KeyframeGraph::Up> ups;
+  for (int i = 0; i < kAll; ++i) {
+    if (i > 0) point = point.after(step);
+    graph.add_keyframe(frame_of(i), point,
+                       i == 0 ? std::nullopt : std::optional(KeyframeGraph::OdometryEdge{step, information}));
+    const double off = i < kOfSession ? 0.01 : -0.01;
+    if (i % 4 == 0) ups.push_back({frame_of(i), Eigen::Vector3d(off, 0.5 * off, 1.0).normalized()});
+  }
+  const auto height_m = [&](int i) { return std::abs(graph.T_world_lidar(frame_of(i)).translation().z()); };
+  ASSERT_TRUE(graph.settle_on_earth({}, {}));
+  const double before_m = height_m(kAll - 1);
+  EXPECT_GT(before_m, 10.0);
+  ASSERT_TRUE(graph.settle_on_earth({}, ups));
+  EXPECT_LT(height_m(kAll - 1), 0.3 * before_m);
+  EXPECT_LT(height_m(kOfSession), 0.3 * before_m);
+}
+
 TEST(KeyframeGraph, MisuseThrows) {
   KeyframeGraph graph;
   EXPECT_THROW(graph.add_keyframe({0}, {}, KeyframeGraph::OdometryEdge{}), std::invalid_argument);

@@ -79,18 +79,21 @@ OverheadImage both(const OverheadImage& a, const OverheadImage& b) {
   return result;
 }
 
-// All cells in the sector of a sensor that stands `x`, `y` cells from the middle, turned by `yaw_rad`.
-OverheadImage image_of(const SeenSpace::Sector& sector, double yaw_rad, int x, int y) {
+// All cells in the sector of a sensor that stands `x` cells from the middle, set upright and turned by `yaw_rad`: by
+// where they lie at its height.
+OverheadImage image_of(const SeenSpace::Sector& sector, const Eigen::Vector3f& up, double yaw_rad, int x) {
   OverheadImage image;
-  const Eigen::Matrix2f back = Eigen::Rotation2Df(static_cast<float>(-yaw_rad)).toRotationMatrix();
+  const Eigen::Matrix2f back =
+      (planar_pose(0.0, 0.0, yaw_rad) * upright_pose(up)).linear().transpose().topLeftCorner<2, 2>().cast<float>();
   constexpr float kMiddle = 0.5f * kSide - 0.5f;
   for (int row = 0; row < kSide; ++row)
     for (int column = 0; column < kSide; ++column) {
-      const Eigen::Vector2f at(static_cast<float>(column - x) - kMiddle, static_cast<float>(row - y) - kMiddle);
+      const Eigen::Vector2f at(static_cast<float>(column - x) - kMiddle, static_cast<float>(row) - kMiddle);
       if (!sector.holds(back * at)) continue;
       const auto bit = static_cast<std::size_t>(row * kSide + column);
       image.bits[bit / 64] |= std::uint64_t{1} << (bit % 64);
     }
+  count(image);
   return image;
 }
 
@@ -148,10 +151,11 @@ OverheadMatch OverheadSearch::match_at(const OverheadImage& place, const Overhea
     return match;
   }
   // Of each only what lies where the other one looks.
-  const OverheadImage seen_by_place = image_of(place_sector_, 0.0, 0, 0),
-                      seen_by_query = image_of(query_sector_, match.yaw_rad, at.x, 0);
-  const OverheadImage place_there = both(place, moved_along_y(seen_by_query, at.y)),
-                      query_there = both(moved_along_y(query, at.y), seen_by_place);
+  OverheadImage place_there = place, query_there = moved_along_y(query, at.y);
+  count(query_there);
+  if (!query_sector_.is_all_round())
+    place_there = both(place, moved_along_y(image_of(query_sector_, query_.up, match.yaw_rad, at.x), at.y));
+  if (!place_sector_.is_all_round()) query_there = both(query_there, seen_by_place_);
   if (std::min(place_there.count, query_there.count) < kFewestCells) return match;
   match.overlap = std::min(share(common(place_grown, query_there, 0), query_there.count),
                            share(common(place_there, grown(moved_along_y(query, at.y)), 0), place_there.count));
@@ -178,6 +182,7 @@ std::vector<OverheadMatch> OverheadSearch::search(const ThinCloud& match, double
   if (cell_m != cell_m_) turns_.clear();
   cell_m_ = cell_m;
   place_sector_ = match.seen.sector();
+  if (!place_sector_.is_all_round()) seen_by_place_ = image_of(place_sector_, match.up, 0.0, 0);
   const OverheadImage place = overhead_image(match, cell_m), place_grown = grown(place);
   const int reach_cells = static_cast<int>(std::lround(reach_m / cell_m));
   const auto nearest = static_cast<int>(std::lround(yaw_rad / kStep_rad));

@@ -61,6 +61,7 @@ class OverheadSearch {
 
   const ThinCloud& query_;
   SeenSpace::Sector query_sector_, place_sector_;
+  OverheadImage seen_by_place_;  ///< where the place's sensor looks, if not all round
   double cell_m_ = 0.0;
   std::map<int, Turned> turns_;  ///< in cells of cell_m_
   std::vector<At> coarse_;       ///< of the search at work

@@ -96,7 +96,7 @@ SeenSpace::Sector SeenSpace::sector() const {
   if (widest < kWidestGap) return {};
   const float half = 0.5f * static_cast<float>(kAzimuths - widest);
   const float middle_rad = (static_cast<float>(sector_begins) + half) / kCellsARad - static_cast<float>(kPi);
-  return {{std::cos(middle_rad), std::sin(middle_rad)}, std::cos(half / kCellsARad)};
+  return {{std::cos(middle_rad), std::sin(middle_rad)}, std::cos(half / kCellsARad), 2.f * half / kCellsARad};
 }
 
 std::vector<std::uint16_t> SeenSpace::ranges_cm() const {

@@ -34,6 +34,7 @@ class SeenSpace {
   struct Sector {
     Eigen::Vector2f middle = Eigen::Vector2f::UnitX();  ///< unit vector
     float least_cosine = -1.f;                          ///< of the angle between it and what was seen
+    float width_rad = 6.2831853f;
 
     bool is_all_round() const { return least_cosine <= -1.f; }
     bool holds(const Eigen::Vector2f& p) const { return is_all_round() || p.dot(middle) >= least_cosine * p.norm(); }

@@ -138,6 +138,7 @@ Result<std::vector<StoredFix>> MapStore::fixes() const {
 
 Result<std::vector<StoredUp>> MapStore::ups() const {
   std::vector<StoredUp> rows;
+  if (database_->version < store_internal::kVersion) return rows;  // none of them had any
   Statement statement = database_->prepare("SELECT frame,up,sum=checksum(frame,up) FROM gravity ORDER BY frame");
   while (statement.step()) {
     StoredUp row{{statement.integer(0)}};

@@ -86,6 +86,12 @@ TEST(MapSchema, AMapOfVersion3IsUpgraded) {
   const fs::path file = map_of_version_2();
   (void)MapStore::open(file);
   run_sql(file, "DROP TABLE gravity; PRAGMA user_version=3");
+  {  // where nothing can be written, too
+    const auto reader = MapStore::open(file, MapStore::Access::kRead);
+    ASSERT_TRUE(reader) << reader.error().message;
+    EXPECT_TRUE(reader->check()) << reader->check().error().message;
+    EXPECT_TRUE(reader->ups()->empty());
+  }
   auto store = MapStore::open(file);
   ASSERT_TRUE(store) << store.error().message;
   EXPECT_EQ(store->keyframes()->size(), 2u);

@@ -23,8 +23,6 @@ const std::string& MapStore::file() const { return database_->file; }
 Result<MapStore> MapStore::create_temporary() { return create({}); }
 
 Result<MapStore> MapStore::create(const std::filesystem::path& file) {
-  std::error_code failure;
-  if (!file.empty() && std::filesystem::exists(file, failure)) return Error{file.string() + ": exists already"};
   auto database = Database::connect(file, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
   if (!database) return database.error();
   // What is taken out makes room for what comes, and goes back to the system at the end.
@@ -35,6 +33,17 @@ Result<MapStore> MapStore::create(const std::filesystem::path& file) {
   return MapStore(*std::move(database));
 }
 
+Status MapStore::remove_file(const std::filesystem::path& file) {
+  std::error_code failure;
+  if (!std::filesystem::exists(file, failure)) return ok();
+  const auto lock = store_internal::WriterLock::take(file);
+  if (!lock) return lock.error();
+  for (const char* ending : {"", "-wal", "-shm"})
+    if (std::filesystem::remove(file.string() + ending, failure); failure)
+      return Error{file.string() + ending + ": cannot be removed: " + failure.message()};
+  return ok();
+}
+
 Result<MapStore> MapStore::open(const std::filesystem::path& file, Access access) {
   auto database = Database::connect(file, access == Access::kRead ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE);
   if (!database) return database.error();
@@ -42,7 +51,9 @@ Result<MapStore> MapStore::open(const std::filesystem::path& file, Access access
   if (const Status status = store_internal::check_length(file.string()); !status) return status.error();
   const auto version = store_internal::version_of(handle, file.string());
   if (!version) return version.error();
-  if (*version == store_internal::kVersion) {
+  (*database)->version = *version;
+  const bool is_readable = access == Access::kRead && *version >= store_internal::kOldestReadable;
+  if (*version == store_internal::kVersion || is_readable) {
     if (access == Access::kWrite)
       if (const Status status = (*database)->journal(); !status) return status.error();
     return MapStore(*std::move(database));
@@ -55,6 +66,7 @@ Result<MapStore> MapStore::open(const std::filesystem::path& file, Access access
     return open(file, access);
   }
   if (const Status status = store_internal::upgrade(handle, file.string(), *version); !status) return status.error();
+  (*database)->version = store_internal::kVersion;
   if (const Status status = (*database)->journal(); !status) return status.error();
   return MapStore(*std::move(database));
 }

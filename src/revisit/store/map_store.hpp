@@ -93,6 +93,8 @@ class MapStore {
   static Result<MapStore> create_temporary();
   /// An existing file is an error.
   static Result<MapStore> create(const std::filesystem::path& file);
+  /// Takes a map away, unless another program writes it.
+  static Status remove_file(const std::filesystem::path& file);
   enum class Access : std::uint8_t { kRead, kWrite };
   /// Refused are files that are no map, or of a version that this program does not know. One of an earlier version is
   /// upgraded, for which it must be writable.

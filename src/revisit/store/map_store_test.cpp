@@ -115,9 +115,14 @@ TEST(MapStore, OneWriterAtATimeAndAnyNumberOfReaders) {
   const auto reader = MapStore::open(file, MapStore::Access::kRead);
   ASSERT_TRUE(reader) << reader.error().message;
   EXPECT_EQ(reader->keyframes()->size(), 1u);
+  EXPECT_FALSE(MapStore::remove_file(file));
+  EXPECT_FALSE(MapStore::create(file));
+  EXPECT_EQ(reader->keyframes()->size(), 1u) << "it is still there";
   first.reset();
   EXPECT_TRUE(MapStore::open(file));
   EXPECT_FALSE(std::filesystem::exists(file.string() + ".lock"));
+  EXPECT_TRUE(MapStore::remove_file(file));
+  EXPECT_FALSE(std::filesystem::exists(file));
 }
 
 TEST(MapStore, RefusesWhatIsNoMap) {

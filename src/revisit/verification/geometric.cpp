@@ -2,6 +2,7 @@
 #include <revisit/verification/geometric.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include <revisit/registration/agreement.hpp>
@@ -33,6 +34,7 @@ struct Refinement {
 // always sees, and by how far up.
 struct Differing {
   static constexpr double kDown = 1.5, kDownALittle = 1.15, kUp = 3.0;  ///< ratios of slopes
+  static constexpr float kNarrower_rad = 1.05f;                         ///< of the sectors that they see
   /// Of what fits between two scans of one sensor: each thins what it sees by where its own lines lie.
   static constexpr double kShare = 0.8;
 };
@@ -64,7 +66,8 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
   LoopEvidence& all = evidence.evidence;
   all.inlier_ratio = agreement.inlier_ratio;
   all.sensors_differ = sensors_differ(match.view(), query.view());
-  all.one_is_narrow = match.view().sector.is_all_round() != query.view().sector.is_all_round();
+  all.one_is_narrow =
+      std::abs(match.view().sector.width_rad - query.view().sector.width_rad) > Differing::kNarrower_rad;
   all.inlier_share =
       agreement.inlier_ratio / (view.typical.inlier_ratio * (all.sensors_differ ? Differing::kShare : 1.0));
   all.free_space_agreement = agreement.free_space_agreement;

@@ -40,6 +40,15 @@ struct MapStore::Database {
   static Result<std::unique_ptr<Database>> connect(const std::filesystem::path& path, int flags) {
     auto database = std::make_unique<Database>();
     database->file = path.string();
+    std::error_code failure;
+    const bool is_there = std::filesystem::exists(path, failure);
+    if ((flags & SQLITE_OPEN_READWRITE) != 0 && !path.empty() && (is_there || (flags & SQLITE_OPEN_CREATE) != 0)) {
+      auto taken = store_internal::WriterLock::take(path);
+      if (!taken) return taken.error();
+      database->lock.emplace(*std::move(taken));
+      if ((flags & SQLITE_OPEN_CREATE) != 0 && std::filesystem::exists(path, failure))
+        return Error{path.string() + ": exists already"};
+    }
     sqlite3* handle = nullptr;
     const int code = sqlite3_open_v2(path.c_str(), &handle, flags, nullptr);
     database->handle.reset(handle);
@@ -52,11 +61,6 @@ struct MapStore::Database {
   }
   // A commit is with the system when it returns: it survives the end of the program, whatever ends it.
   Status journal() {
-    if (!file.empty() && !lock) {
-      auto taken = store_internal::WriterLock::take(file);
-      if (!taken) return taken.error();
-      lock.emplace(*std::move(taken));
-    }
     writes = true;
     for (const char* sql : {"PRAGMA journal_mode=WAL", "PRAGMA synchronous=NORMAL", "PRAGMA cache_size=-8000"})
       if (const Status status = run(sql); !status) return status;
@@ -75,6 +79,7 @@ struct MapStore::Database {
     return ended;
   }
   bool writes = false;
+  int version = store_internal::kVersion;
 
   Database() = default;
   Database(const Database&) = delete;

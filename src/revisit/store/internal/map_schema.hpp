@@ -11,6 +11,8 @@ namespace revisit::store_internal {
 
 /// How a map lies in its file (docs/maps.md), and how files of earlier versions become it.
 inline constexpr int kApplication = 0x52565354, kVersion = 4;
+/// A map of this version is read as it is: it lacks what may be empty.
+inline constexpr int kOldestReadable = 3;
 
 /// Whether the file is as long as its header says, as far as no other program's changes wait beside it.
 Status check_length(const std::string& file);
