@@ -2,7 +2,6 @@
 #include <revisit/io/convert_recording.hpp>
 
 #include <cstdio>
-#include <limits>
 #include <optional>
 
 #include <revisit/io/bag_writer.hpp>
@@ -61,7 +60,8 @@ class BagTarget final : public Target {
   std::vector<GpsFix> fixes_;
   std::size_t next_fix_ = 0;
   bool has_frames_ = false;
-  double imu_until_s_ = -std::numeric_limits<double>::infinity();
+  double imu_until_s_ =
+      -2.0 * kSameTime_s;  ///< the clock of ROS begins at 0: readings before a first scan at 0 stay out
 };
 
 class KittiTarget final : public Target {

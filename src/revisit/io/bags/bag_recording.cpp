@@ -5,10 +5,10 @@
 #include <cmath>
 #include <cstdint>
 
+#include <revisit/core/stamps.hpp>
 #include <revisit/io/internal/bytes.hpp>
 #include <revisit/io/internal/remarks.hpp>
 #include <revisit/io/internal/scan_source.hpp>
-#include <revisit/io/internal/stamps.hpp>
 #include <revisit/io/internal/topic_choice.hpp>
 #include <revisit/io/pose_file.hpp>
 

@@ -343,6 +343,17 @@ void write_drive(const fs::path& file) {
   ASSERT_TRUE(writer->finish());
 }
 
+TEST(Bag, NothingBeforeTheClockOfRosIsWritten) {
+  const fs::path folder = fresh_folder();
+  for (const char* name : {"a.bag", "a.mcap", "a.db3"}) {
+    auto writer = BagWriter::create(folder / name);
+    ASSERT_TRUE(writer);
+    const Status written = writer->write_imu("/imu", "lidar", 0.0, ImuSample{-0.1, {}, {}});
+    ASSERT_FALSE(written) << name;
+    EXPECT_NE(written.error().message.find("-0.100 s"), std::string::npos) << written.error().message;
+  }
+}
+
 // The format's own library, where `make test` has installed it.
 const fs::path kMcapList = testing_support::source_dir() / "tests" / "oracles" / "mcap";
 

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
+#include <revisit/core/stamps.hpp>
 #include <revisit/io/internal/bag_recording.hpp>
 #include <revisit/io/internal/capture.hpp>
-#include <revisit/io/internal/stamps.hpp>
 #include <revisit/io/internal/topic_choice.hpp>
 
 namespace revisit {

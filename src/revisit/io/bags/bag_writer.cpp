@@ -3,15 +3,15 @@
 
 #include <algorithm>
 
+#include <revisit/core/stamps.hpp>
+#include <revisit/core/text.hpp>
 #include <revisit/io/internal/bag_file_writer.hpp>
 #include <revisit/io/internal/byte_buffer.hpp>
 #include <revisit/io/internal/message_writer.hpp>
-#include <revisit/io/internal/stamps.hpp>
 
 namespace revisit {
 
 using io_internal::MessageWriter;
-using io_internal::to_nanoseconds;
 
 namespace {
 
@@ -54,6 +54,9 @@ Result<BagWriter> BagWriter::create(const std::filesystem::path& file) {
 
 Status BagWriter::write(const std::string& topic, const std::string& type, std::int64_t log_time_ns,
                         const std::string& message) {
+  if (log_time_ns < 0)
+    return Error{topic + ": a message of " + format("%.3f", to_seconds(log_time_ns)) +
+                 " s; the clock of ROS begins at 0"};
   auto found = topics_.find(topic);
   if (found == topics_.end()) {
     if (const Status status = file_->add_topic(topic, type); !status) return status;

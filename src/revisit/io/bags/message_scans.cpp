@@ -3,9 +3,9 @@
 #include <array>
 #include <cmath>
 
+#include <revisit/core/stamps.hpp>
 #include <revisit/core/text.hpp>
 #include <revisit/io/internal/scan_source.hpp>
-#include <revisit/io/internal/stamps.hpp>
 
 namespace revisit::io_internal {
 namespace {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 
+#include <revisit/core/stamps.hpp>
 #include <revisit/io/internal/scan_source.hpp>
-#include <revisit/io/internal/stamps.hpp>
 
 namespace revisit::io_internal {
 namespace {
