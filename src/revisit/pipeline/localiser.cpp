@@ -36,6 +36,12 @@ struct Nearby {
   static constexpr double kSame_m = 1.0;  ///< the same pose
 };
 
+struct Expecting {
+  static constexpr double kNear_m = 4.0, kNear_deg = 40.0;  ///< by hand, on a picture of the map
+  static constexpr double kDrive_m = 20.0;                  ///< for which it is remembered
+  static constexpr std::size_t kPlaces = 4;
+};
+
 struct Moving {
   static constexpr double kHopeless_log_odds = -15.0, kCertain_log_odds = 9.0;
   static constexpr double kStill_m = 0.1, kArm_m = 10.0;  ///< within a sweep; a turn counts at this distance
@@ -187,6 +193,10 @@ Result<Localisation> Localiser::follow(Scan scan, const std::optional<Pose>& T_e
   else
     point_ = TrajectoryPoint{.segment = step.segment, .T_segment_lidar = step.T_odom_lidar, .origin = step.segment};
   if (following_ && following_->at.segment != point_->segment) following_.reset();  // odometry has lost itself
+  if (expected_ && !expected_->at) expected_->at = *point_;
+  if (expected_ && (expected_->at->segment != point_->segment ||
+                    point_->travelled_m - expected_->at->travelled_m > Expecting::kDrive_m))
+    expected_.reset();
   auto prepared = preparation_.prepare(std::move(scan), step.motion);
   if (!prepared) return prepared.error();
   if (following_) {
@@ -202,12 +212,17 @@ Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const Trajecto
   auto detection = recognition_.find(scan, places(), typical_);
   if (!detection) return detection.error();
   ask_for_more_of_narrow_views(*detection);
+  if (expected_)
+    if (const Status looked = look_where_expected(scan, point, *detection); !looked) return looked.error();
   std::vector<PoseBelief::Sighting> sightings;
-  for (const Detection::Registered& each : detection->registered)
-    sightings.push_back({each.match, map_.part(each.match), map_.T_map_lidar(each.match) * each.evidence.T_match_query,
-                         each.evidence.evidence.one_is_narrow
-                             ? std::min(each.evidence.own_log_odds, Waking::kNarrowView_log_odds)
-                             : each.evidence.own_log_odds});
+  for (const Detection::Registered& each : detection->registered) {
+    const Pose T_map_lidar = map_.T_map_lidar(each.match) * each.evidence.T_match_query;
+    const int part = map_.part(each.match);
+    const double log_odds = each.evidence.evidence.one_is_narrow
+                                ? std::min(each.evidence.own_log_odds, Waking::kNarrowView_log_odds)
+                                : each.evidence.own_log_odds;
+    sightings.push_back({each.match, part, T_map_lidar, log_odds + expectation_log_odds(T_map_lidar, part, point)});
+  }
   belief_.add(point, sightings);
   Localisation result;
   result.reason = detection->reason();
@@ -232,6 +247,7 @@ Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const Trajecto
                            result.information,
                            result.probability};
     belief_.clear();
+    expected_.reset();
   }
   result.frame = scan.scan.frame;
   result.detection = *std::move(detection);
@@ -279,6 +295,45 @@ Status Localiser::look_nearby(const PreparedScan& scan, Detection& detection) {
         LoopConstraint{detection.frame,       each.match,        found.T_match_query, found.evidence.inlier_ratio,
                        found.evidence.rmse_m, found.probability, tested->score(),     found.information};
     detection.refusal.reset();
+  }
+  return ok();
+}
+
+void Localiser::expect(const Pose& T_map_lidar) {
+  const StoredMapPose* nearest = nullptr;
+  const auto distance_m = [&](const StoredMapPose& each) {
+    return (each.T_map_lidar.translation() - T_map_lidar.translation()).head<2>().norm();
+  };
+  for (const StoredMapPose& each : map_.poses())
+    if (each.part == 0 && (nearest == nullptr || distance_m(each) < distance_m(*nearest))) nearest = &each;
+  if (nearest == nullptr) return;
+  // As high as the place beside it, and tilted as it is.
+  const double turn_rad = yaw_of(T_map_lidar) - yaw_of(nearest->T_map_lidar);
+  Pose T = Pose::Identity();
+  T.translation() << T_map_lidar.translation().head<2>(), nearest->T_map_lidar.translation().z();
+  T.linear() = Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ()) * nearest->T_map_lidar.linear();
+  expected_ = Expected{T, std::nullopt};
+  following_.reset();
+  belief_.clear();
+}
+
+double Localiser::expectation_log_odds(const Pose& T_map_lidar, int part, const TrajectoryPoint& point) const {
+  if (!expected_ || part != 0) return 0.0;
+  const Pose T_expected = expected_->at_point(point);
+  const Pose off = T_expected.inverse() * T_map_lidar;
+  if (off.translation().norm() > Expecting::kNear_m || rotation_angle(off) > to_radians(Expecting::kNear_deg))
+    return 0.0;
+  std::size_t there = 1;
+  for (const StoredMapPose& each : map_.poses())
+    there += each.part == 0 && (each.T_map_lidar.translation() - T_expected.translation()).norm() <= Expecting::kNear_m;
+  return std::log(std::max(1.0, static_cast<double>(map_.poses().size()) / static_cast<double>(there)));
+}
+
+Status Localiser::look_where_expected(const PreparedScan& scan, const TrajectoryPoint& point, Detection& detection) {
+  for (const PosePrediction& each : nearest_places(expected_->at_point(point), 0, Expecting::kPlaces)) {
+    const auto tested = recognition_.test(scan, each, typical_);
+    if (!tested) return tested.error();
+    if (tested->geometric) detection.registered.push_back({each.match, *tested->geometric});
   }
   return ok();
 }

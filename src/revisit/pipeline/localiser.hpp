@@ -51,6 +51,10 @@ class Localiser {
   /// found again where it gets lost. Frames and stamps increase. `T_external_lidar`: as in Slam::process().
   Result<Localisation> follow(Scan scan, const std::optional<Pose>& T_external_lidar = std::nullopt);
 
+  /// Somebody says where the next scan is, to a few metres and 40 degrees: follow() lets go of what it holds, and looks
+  /// there as well as everywhere. Height and tilt are the map's. Of a map in several parts, the first.
+  void expect(const Pose& T_map_lidar);
+
   std::size_t places() const { return recognition_.index().size(); }
   const SavedPlaces& map() const { return map_; }
 
@@ -62,6 +66,9 @@ class Localiser {
   /// The places nearest to a pose in a part of the map, the nearest first, with the pose relative to each.
   std::vector<PosePrediction> nearest_places(const Pose& T_map_lidar, int part, std::size_t count) const;
   Status look_nearby(const PreparedScan& scan, Detection& detection);
+  Status look_where_expected(const PreparedScan& scan, const TrajectoryPoint& point, Detection& detection);
+  /// What it is worth to be where somebody expects it: as much as there is elsewhere.
+  double expectation_log_odds(const Pose& T_map_lidar, int part, const TrajectoryPoint& point) const;
   Localisation found(FrameId frame, const LoopConstraint& loop) const;
 
   struct Following {
@@ -74,6 +81,14 @@ class Localiser {
     double probability = 0.0;
   };
 
+  struct Expected {
+    Pose T_map_lidar = Pose::Identity();  ///< at the point of the trajectory, once there is one
+    std::optional<TrajectoryPoint> at;
+    Pose at_point(const TrajectoryPoint& point) const {
+      return T_map_lidar * at->T_segment_lidar.inverse() * point.T_segment_lidar;
+    }
+  };
+
   Parameters parameters_;
   SavedPlaces map_;
   Odometry odometry_;
@@ -83,6 +98,7 @@ class Localiser {
   PoseBelief belief_;
   std::optional<TrajectoryPoint> point_;
   std::optional<Following> following_;
+  std::optional<Expected> expected_;
 };
 
 }  // namespace revisit

@@ -69,6 +69,29 @@ TEST(Localiser, ANarrowViewIsFoundByADriveNotByOneScan) {
   EXPECT_GT(found, 15u);
 }
 
+// What one scan of a sensor that looks ahead does not decide is decided where somebody says where it is: two metres
+// and twenty degrees off, without height. Said wrongly, it is no answer.
+TEST(Localiser, APoseThatIsExpectedIsLookedForThere) {
+  const fs::path map = small_map();
+  const auto follow = [&](const std::optional<Pose>& T_expected) {
+    auto localiser = Localiser::open(map);
+    if (T_expected) localiser->expect(*T_expected);
+    Scan scan = town().scan(pose_at(20), kSensor, 720);
+    std::erase_if(scan.points, [](const Point& p) { return !(p.x > 0.f && std::abs(p.y) < p.x); });
+    scan.rings.clear();
+    scan.times_s.clear();
+    return localiser->follow(std::move(scan));
+  };
+  const Pose truth = pose_at(0).inverse() * pose_at(20);
+  Pose near = truth * SyntheticWorld::at(1.5, -1.2, to_radians(20.0)), far = truth * SyntheticWorld::at(-12.0, 0, 0);
+  near.translation().z() = far.translation().z() = 0.0;
+  EXPECT_FALSE(follow(std::nullopt)->T_map_lidar);
+  EXPECT_FALSE(follow(far)->T_map_lidar);
+  const auto found = follow(near);
+  ASSERT_TRUE(found && found->T_map_lidar) << found->reason;
+  EXPECT_LT((truth.inverse() * *found->T_map_lidar).translation().norm(), 0.3);
+}
+
 TEST(Localiser, OneScanAnswersFromTheMapOfAnEarlierRun) {
   const fs::path map = small_map();
   auto localiser = Localiser::open(map);

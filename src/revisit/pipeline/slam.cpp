@@ -131,6 +131,12 @@ Result<SlamStep> Slam::process(Scan scan, const std::optional<Pose>& T_external_
   return step;
 }
 
+Status Slam::add(const GpsFix& fix) {
+  if (!failure_) return failure_;
+  if (const Status added = back_end_.add_gps(fix); !added) failure_ = added;
+  return failure_;
+}
+
 Status Slam::finish() {
   if (!failure_) return failure_;
   return has_keyframes() ? back_end_.finish() : store_->roll_back();  // an empty session is none

@@ -57,6 +57,8 @@ class Slam {
   /// Stamps that do not increase are replaced, which is logged. An error says why the scan cannot be used; the next one
   /// can, unless the store failed: then every call gives that error, and the folder holds what was committed before.
   Result<SlamStep> process(Scan scan, const std::optional<Pose>& T_external_lidar = std::nullopt);
+  /// What a GPS receiver says meanwhile, in the order of the stamps, which are on the scans' clock.
+  Status add(const GpsFix& fix);
   /// Decides about loops that wait for others, and settles the graph. More scans may follow.
   Status finish();
   /// The pose of the external odometry at the last scan of the map that this run continues.

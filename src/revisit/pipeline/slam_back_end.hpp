@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <revisit/core/gps_fix.hpp>
@@ -29,7 +31,9 @@ class SlamBackEnd {
   /// An error where the store failed: it and the graph are then no longer the same.
   Result<Added> add_keyframe(PreparedScan scan, const OdometryStep& odometry, const SensorFacts& sensor);
   /// What a receiver said meanwhile, in the order of its times, by the recording's clock.
-  void set_gps(std::vector<GpsFix> fixes) { gps_ = std::move(fixes); }
+  void set_gps(std::vector<GpsFix> fixes) { gps_.assign(fixes.begin(), fixes.end()); }
+  /// The next one of a receiver at work.
+  Status add_gps(const GpsFix& fix);
   /// A key frame of another map enters this one, and is looked for among the first `places` of it.
   struct Entry {
     StoredKeyframe row;  ///< the bytes of `place` need not be there
@@ -68,9 +72,10 @@ class SlamBackEnd {
   Status enter_keyframe(Entry entry, Result<Detection> detection, Added& added);
   Status enter(const std::vector<LoopGate::Decision>& decisions, std::size_t& entered);
 
-  std::vector<GpsFix> gps_;
-  std::optional<Eigen::Vector3d> last_fix_at_m_;  ///< where in the graph the last one was that was kept
-  std::optional<double> last_up_s_;               ///< likewise of gravity, when
+  std::deque<GpsFix> gps_;
+  std::vector<std::pair<FrameId, double>> without_fix_;  ///< the last key frames, and stamps: the fix after is to come
+  std::optional<Eigen::Vector3d> last_fix_at_m_;         ///< where in the graph the last one was that was kept
+  std::optional<double> last_up_s_;                      ///< likewise of gravity, when
   FrameTime time_in_index(const FrameTime& frame);
 
   StoredSession session_;

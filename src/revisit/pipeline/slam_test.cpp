@@ -207,6 +207,28 @@ TEST(Slam, KeepsWhereAnAccelerometerFeelsUp) {
   }
 }
 
+// A receiver speaks twice a second, and after the scans that it is about.
+TEST(Slam, FixesOfAReceiverAtWorkAreKeptByKeyFrame) {
+  Drive drive("gps");
+  constexpr double kMetresADegree = 111'320.0;
+  for (int i = 0; i < kOut; ++i) {
+    drive.go(i, i + 1);
+    if (i % 5 != 0 || i == 40 || i == 45 || i == 50 || i == 55) continue;  // a gap of 2.5 s
+    const double latitude_deg = (pose_of(i).translation().x() - pose_of(0).translation().x()) / kMetresADegree;
+    ASSERT_TRUE(drive.slam->add(GpsFix{0.1 * i, latitude_deg, 8.0, 400.0, {1.0, 1.0, 2.0}}));
+  }
+  ASSERT_TRUE(drive.slam->finish());
+  const auto fixes = drive.slam->store().fixes();
+  ASSERT_TRUE(fixes);
+  EXPECT_GE(fixes->size(), 4u);
+  EXPECT_LE(fixes->size(), 7u) << "one in ten metres";
+  for (const StoredFix& each : *fixes) {
+    const int i = static_cast<int>(each.keyframe.value);
+    EXPECT_NEAR(each.fix.latitude_deg * kMetresADegree, kStep_m * i, 0.01) << i;
+    EXPECT_FALSE(i > 35 && i < 60) << "in the gap";
+  }
+}
+
 TEST(Slam, TakesAnotherOdometryAsItIs) {
   const auto file = std::filesystem::path(testing::TempDir()) / "revisit_slam_external.map";
   for (const char* ending : {"", "-wal", "-shm"}) std::filesystem::remove(file.string() + ending);
