@@ -138,6 +138,7 @@ TEST(MapCli, MergesAndExports) {
   for (const auto& [form, file] : {std::pair{"ply", "map.ply"},
                                    {"pcd", "map.pcd"},
                                    {"las", "map.las"},
+                                   {"png", "map.png"},
                                    {"tiles", "tiles/tiles.json"},
                                    {"grid", "grid.yaml"},
                                    {"tum", "session_1.tum"},

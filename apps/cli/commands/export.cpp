@@ -16,6 +16,7 @@
 #include <revisit/store/keyframe_bytes.hpp>
 
 #include "common.hpp"
+#include "pictures/map_picture.hpp"
 #include "progress.hpp"
 
 namespace revisit::cli {
@@ -110,6 +111,7 @@ Status export_points(const SavedMap& map, const Part& part, const ExportOptions&
   });
   Status status = report ? ok() : Status(report.error());
   if (status && interrupted()) status = Error{"interrupted; nothing was written"};
+  if (status && options.as == "png") status = draw_map(scratch / "map.png", scratch / "tiles", part.poses);
   if (status) {
     const std::string name = options.as == "tiles" ? "tiles" : "map." + options.as;
     if (options.as == "tiles") fs::remove_all(out / name, failure);
@@ -192,6 +194,7 @@ Run add_export(CLI::App& program) {
   CLI::App* command = program.add_subcommand("export", "Write a map in a form that other programs read.");
   command->footer(
       "  ply, pcd, las  the points: map.ply, map.pcd, map.las\n"
+      "  png            a picture of the map from above\n"
       "  tiles          the points in squares of 50 m, with tiles.json\n"
       "  grid           grid.pgm and grid.yaml: what is free, occupied and unknown, for navigation in two dimensions\n"
       "  tum            the trajectory of each session: session_0.tum, ...\n"
@@ -200,7 +203,7 @@ Run add_export(CLI::App& program) {
   command->add_option("map", options->map, "Map: the file, or the folder of `revisit slam --out`")->required();
   command->add_option("--as", options->as, "Form")
       ->required()
-      ->check(CLI::IsMember({"ply", "pcd", "las", "tiles", "grid", "tum", "g2o"}));
+      ->check(CLI::IsMember({"ply", "pcd", "las", "png", "tiles", "grid", "tum", "g2o"}));
   command->add_option("--out", options->out, "Folder for the files")->required();
   command->add_option("--part", options->part, "Of a map whose sessions are not all joined: which part (see info)");
   command->add_option(
