@@ -153,7 +153,7 @@ Result<TopicChoice> choose_topics(const Bag& bag, const RecordingOptions& option
   if (!lidar) return lidar.error();
   choice.lidar = *lidar;
   if (!choice.lidar) return choice;
-  const StaticFrames frames = StaticFrames::of_bag(bag);
+  const StaticFrames frames = static_frames_of(bag);
   const std::string lidar_frame = text_of_first(bag, *choice.lidar, "header.frame_id");
   if (const Status status = choose_odometry(bag, options, frames, lidar_frame, choice); !status) return status.error();
   if (options.use_imu) choose_imu(bag, frames, lidar_frame, choice);

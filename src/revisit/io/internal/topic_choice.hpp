@@ -6,7 +6,7 @@
 #include <vector>
 
 #include <revisit/io/internal/bag.hpp>
-#include <revisit/io/internal/static_frames.hpp>
+#include <revisit/io/internal/bag_frames.hpp>
 #include <revisit/io/recording.hpp>
 
 namespace revisit::io_internal {
