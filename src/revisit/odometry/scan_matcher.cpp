@@ -29,6 +29,7 @@ struct Matching {
   static constexpr double kSteady_m = 0.02;   ///< rocking between two voxels counts as converged
   static constexpr double kFineVoxels = 0.3, kFine_m = 0.1;  ///< narrowest kernel: so many voxels and so much more
   static constexpr double kTurnsTried_deg[] = {0.0, 5.0, -5.0, 10.0, -10.0};  ///< where the prediction failed
+  static constexpr std::size_t kFew = 1000;  ///< points of a scan, about, with which these are tried
 
   static constexpr double kFewestMatched = 0.3;  ///< share of the points of a scan that is tracked
   static constexpr double kBelowTypical = 0.2;   ///< what it may fall below the running mean
@@ -150,8 +151,8 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
     return match;
   }
   insertion_->tasks.wait();
-  const auto align = [&](double width_m, const Pose& T_guess) {
-    IcpResult icp = align_icp(*map_, scan.points, T_odom_lidar_ * T_guess,
+  const auto align_points = [&](std::span<const Eigen::Vector3f> points, double width_m, const Pose& T_guess) {
+    IcpResult icp = align_icp(*map_, points, T_odom_lidar_ * T_guess,
                               {.coarse_m = width_m,
                                .fine_m = std::min(width_m, fine_m()),
                                .least_reach_m = map_->voxel_m(),
@@ -160,6 +161,7 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
     icp.converged = icp.converged || (icp.information(0, 0) > 0.0 && icp.last_step_m < Matching::kSteady_m);
     return icp;
   };
+  const auto align = [&](double width_m, const Pose& T_guess) { return align_points(scan.points, width_m, T_guess); };
   const double gap_s = stamp_s - last_stamp_s_;
   // Since the last scan that was tracked: the longer ago, the farther may the sensor be from where it was predicted.
   const double untracked_s = stamp_s - tracked_stamp_s_;
@@ -180,11 +182,21 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
   IcpResult icp = align(radius_m, T_predicted);
   if (!is_possible(icp)) icp = align(std::min(radius_m, Matching::kNarrowSearch_m), T_predicted);
   // A turn or a jolt that was not predicted, or the end of one. After a gap anything may fit somehow: nothing is tried.
+  // With a few of the points; where these fit better, all are aligned.
   const bool follows = gap_s > 0.0 && gap_s <= Matching::kLongestGap_s;
+  std::vector<Eigen::Vector3f> few;
+  double best_of_few = 0.0;
   for (const double turn_deg : Matching::kTurnsTried_deg)
     for (const Pose& T_guess : {T_predicted, Pose(Pose::Identity())}) {
       if (fits(icp) || (turn_deg != 0.0 && !follows)) break;
-      const IcpResult other = align(Matching::kFarSearch_m, T_guess * planar_pose(0.0, 0.0, to_radians(turn_deg)));
+      if (few.empty())
+        for (std::size_t i = 0; i < scan.points.size(); i += 1 + scan.points.size() / (2 * Matching::kFew))
+          few.push_back(scan.points[i]);
+      const IcpResult tried =
+          align_points(few, Matching::kFarSearch_m, T_guess * planar_pose(0.0, 0.0, to_radians(turn_deg)));
+      if (tried.matched <= best_of_few) continue;
+      best_of_few = tried.matched;
+      const IcpResult other = align(fine_m(), T_odom_lidar_.inverse() * tried.T_target_source);
       if (fits(other) || other.matched > icp.matched) icp = other;
     }
   match.matched = icp.matched;
