@@ -40,14 +40,15 @@ void PoseBelief::add(const TrajectoryPoint& point, std::span<const Sighting> sig
              rotation_angle(error) <= to_radians(Adding::kSame_deg);
     });
     if (known == hypotheses_.end()) {
-      hypotheses_.push_back({sighting.match, sighting.part, T_map_segment, sighting.log_odds});
+      hypotheses_.push_back(
+          {sighting.match, sighting.part, T_map_segment, sighting.log_odds + sighting.prior_log_odds});
       continue;
     }
     const auto i = static_cast<std::size_t>(known - hypotheses_.begin());
     known->match = sighting.match;
     known->T_map_segment = T_map_segment;
     if (i >= is_seen.size()) {  // of this scan already: another place says the same
-      known->log_odds = std::max(known->log_odds, sighting.log_odds);
+      known->log_odds = std::max(known->log_odds, sighting.log_odds + sighting.prior_log_odds);
     } else if (!is_seen[i]) {
       is_seen[i] = true;
       known->log_odds = std::max(known->log_odds + weight * new_log_odds, sighting.log_odds);

@@ -19,7 +19,8 @@ class PoseBelief {
     FrameId match;
     int part = 0;  ///< of the map
     Pose T_map_lidar = Pose::Identity();
-    double log_odds = 0.0;  ///< by the evidence of this scan alone
+    double log_odds = 0.0;        ///< by the evidence of this scan alone
+    double prior_log_odds = 0.0;  ///< known without it; counts once, however many scans there are
   };
   struct Hypothesis {
     FrameId match;  ///< of the last sighting

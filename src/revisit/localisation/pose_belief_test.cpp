@@ -74,6 +74,19 @@ TEST(PoseBelief, WhatNeverFitsWellNeverBecomesSure) {
   }
 }
 
+// Somebody said that it is there; what is seen on the way speaks against it.
+TEST(PoseBelief, APriorCountsOnce) {
+  Drive drive;
+  for (int i = 0; i < 8; ++i) {
+    auto sighting = drive.seen(-2.0);
+    sighting.prior_log_odds = 4.7;
+    drive.belief.add(drive.point, std::span(&sighting, 1));
+    drive.go(3.0);
+  }
+  const auto best = drive.belief.best();
+  EXPECT_TRUE(!best || best->log_odds < 0.0) << best->log_odds;
+}
+
 TEST(PoseBelief, AnotherSegmentBeginsAnew) {
   Drive drive;
   const auto sighting = drive.seen(5.0);

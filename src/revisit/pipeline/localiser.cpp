@@ -221,7 +221,7 @@ Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const Trajecto
     const double log_odds = each.evidence.evidence.one_is_narrow
                                 ? std::min(each.evidence.own_log_odds, Waking::kNarrowView_log_odds)
                                 : each.evidence.own_log_odds;
-    sightings.push_back({each.match, part, T_map_lidar, log_odds + expectation_log_odds(T_map_lidar, part, point)});
+    sightings.push_back({each.match, part, T_map_lidar, log_odds, expectation_log_odds(T_map_lidar, part, point)});
   }
   belief_.add(point, sightings);
   Localisation result;

@@ -224,6 +224,10 @@ Status SlamBackEnd::finish() {
 }
 
 Status SlamBackEnd::add_gps(const GpsFix& fix) {
+  if (!gps_.empty() && fix.stamp_s < gps_.back().stamp_s - kKeptFixes_s) {  // the clock was set back, or lied
+    gps_.clear();
+    without_fix_.clear();
+  }
   if (!gps_.empty() && fix.stamp_s <= gps_.back().stamp_s) return ok();
   gps_.push_back(fix);
   for (const auto& [keyframe, stamp_s] : std::exchange(without_fix_, {}))
