@@ -90,7 +90,7 @@ OverheadImage image_of(const SeenSpace::Sector& sector, const Eigen::Vector3f& u
     for (int column = 0; column < kSide; ++column) {
       const Eigen::Vector2f at(static_cast<float>(column - x) - kMiddle, static_cast<float>(row) - kMiddle);
       if (!sector.holds(back * at)) continue;
-      const auto bit = static_cast<std::size_t>(row * kSide + column);
+      const std::size_t bit = static_cast<std::size_t>(row) * kSide + static_cast<std::size_t>(column);
       image.bits[bit / 64] |= std::uint64_t{1} << (bit % 64);
     }
   count(image);
