@@ -1,5 +1,5 @@
 # The front door on a bare Debian 12 machine. `make demo` and `make test` install what is missing, build and run.
-.PHONY: demo test oracles build configure packages bench lint format sanitize clean
+.PHONY: demo ros1 ros1-demo ros2 test oracles build configure packages bench lint format sanitize clean
 JOBS ?= $(shell nproc)
 # What ccache keeps of one clone serves the others.
 export CCACHE_BASEDIR ?= $(CURDIR)
@@ -9,6 +9,23 @@ demo: packages configure
 	cmake --build --preset release --parallel $(JOBS) --target revisit
 	@ln -sfn release/revisit build/revisit
 	@scripts/demo.sh
+
+# The node of ROS 1: `. build/ros1/setup.bash`, then roslaunch revisit_ros ... (bindings/ros1/README.md).
+ros1: packages
+	@scripts/install_packages.sh $$(grep -v '^#' bindings/ros1/packages.txt)
+	@cmake --preset release --log-level=NOTICE > /dev/null
+	cmake --build --preset release --parallel $(JOBS) --target revisit revisit_ros1 revisit_ros1_python
+	@ln -sfn release/revisit build/revisit
+	@cmake --install build/release --component ros1 --prefix build/ros1 > /dev/null
+
+ros1-demo: ros1
+	@scripts/ros1_demo.sh
+
+# A node that speaks to ROS 2 without ROS 2 (bindings/ros2/README.md).
+ros2: packages
+	@scripts/install_packages.sh $$(grep -v '^#' bindings/ros2/packages.txt)
+	@cmake --preset release --log-level=NOTICE > /dev/null
+	cmake --build --preset release --parallel $(JOBS) --target revisit_dds_node
 
 test: oracles build
 	ctest --preset release --parallel $(JOBS)

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/pipeline/loop_detector.hpp>
+
+#include "mode.hpp"
+
+namespace revisit::node {
+namespace {
+
+class DetectMode final : public Mode {
+ public:
+  DetectMode(const Parameters& parameters, Outlet& outlet, const LogSink& log)
+      : outlet_(outlet), detector_(parameters, std::nullopt, {}, log) {}
+
+  Status process(Scan scan, const Moment& moment) override {
+    stamps_ns_[scan.frame] = moment.stamp_ns;
+    auto detection = detector_.process(std::move(scan));
+    if (!detection) return detection.error();
+    if (!detection->loop) return ok();
+    ++loops_;
+    outlet_.send(message_of(*detection->loop, moment, stamps_ns_.at(detection->loop->match)));
+    return ok();
+  }
+  std::string state() const override {
+    return std::to_string(detector_.index().size()) + " places, " + std::to_string(loops_) + " loops";
+  }
+
+ private:
+  Outlet& outlet_;
+  LoopDetector detector_;
+  std::map<FrameId, std::int64_t> stamps_ns_;
+  std::size_t loops_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Mode> make_detect_mode(const Parameters& parameters, Outlet& outlet, const LogSink& log) {
+  return std::make_unique<DetectMode>(parameters, outlet, log);
+}
+
+}  // namespace revisit::node

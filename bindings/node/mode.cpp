@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mode.hpp"
+
+#include <Eigen/LU>
+
+namespace revisit::node {
+
+Loop message_of(const LoopConstraint& loop, const Moment& moment, std::int64_t match_stamp_ns) {
+  const Eigen::Matrix<double, 6, 6> covariance = covariance_of(loop.information);
+  return {moment.stamp_ns,
+          match_stamp_ns,
+          in_recording(loop.query).value,
+          in_recording(loop.match).value,
+          moment.lidar_frame,
+          loop.T_match_query,
+          covariance,
+          turned(loop.T_match_query, covariance),
+          loop.probability};
+}
+
+std::optional<Frame> map_frame_of(const Settings& settings, const Moment& moment, const Pose& T_map_lidar) {
+  if (moment.T_odom_lidar)
+    return Frame{moment.stamp_ns, settings.map_frame, moment.odom_frame,
+                 normalised(T_map_lidar * moment.T_odom_lidar->inverse())};
+  if (moment.has_odometry || !moment.T_base_lidar) return std::nullopt;
+  return Frame{moment.stamp_ns, settings.map_frame, moment.base_frame,
+               normalised(T_map_lidar * moment.T_base_lidar->inverse())};
+}
+
+Eigen::Matrix<double, 6, 6> turned(const Pose& T, const Eigen::Matrix<double, 6, 6>& covariance) {
+  Eigen::Matrix<double, 6, 6> turn = Eigen::Matrix<double, 6, 6>::Zero();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = T.linear();
+  return turn * covariance * turn.transpose();
+}
+
+Eigen::Matrix<double, 6, 6> covariance_of(const Matrix6& information) {
+  Vector6 least;
+  least << 1e-4, 1e-4, 1e-4, 1e-2, 1e-2, 1e-2;
+  const Matrix6 covariance = (information + Matrix6(least.asDiagonal())).inverse();
+  return 0.5 * (covariance + covariance.transpose());
+}
+
+MapCloud to_map_cloud(const Settings& settings, const std::vector<Point>& points) {
+  MapCloud cloud{settings.map_frame, {}};
+  cloud.points.reserve(4 * points.size());
+  for (const Point& p : points) cloud.points.insert(cloud.points.end(), {p.x, p.y, p.z, p.intensity});
+  return cloud;
+}
+
+}  // namespace revisit::node

@@ -1,0 +1,389 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "node.hpp"
+
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include <revisit/core/pose.hpp>
+#include <revisit/core/stamps.hpp>
+#include <revisit/pipeline/loop_detector.hpp>
+
+#include "inbox.hpp"
+#include "shared_data.hpp"
+#include "synthetic_world.hpp"
+#include "translate.hpp"
+
+namespace revisit::node {
+namespace {
+
+using testing_support::fresh_folder;
+using testing_support::SyntheticWorld;
+
+constexpr int kThere = 45, kAll = 2 * kThere;
+constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'000;
+
+// Along a road and, in reverse, back beside it.
+Pose pose_of(int i) {
+  return i < kThere ? SyntheticWorld::at(-20.0 + 0.8 * i, 0.0, 0.0)
+                    : SyntheticWorld::at(15.2 - 0.8 * (i - kThere), 0.3, 0.0);
+}
+std::int64_t stamp_of(int i) { return kStart_ns + 100'000'000LL * i; }
+
+Scan scan_of(int i) {
+  static const SyntheticWorld world(61);
+  return world.scan(pose_of(i), {16, 360, -20.0, 6.0}, static_cast<unsigned>(i));
+}
+
+Cloud to_message(const Scan& scan, std::int64_t stamp_ns) {
+  const auto bytes = std::make_shared<std::vector<std::uint8_t>>(16 * scan.points.size());
+  for (std::size_t k = 0; k < scan.points.size(); ++k) {
+    const float values[] = {scan.points[k].x, scan.points[k].y, scan.points[k].z, scan.points[k].intensity};
+    std::memcpy(bytes->data() + 16 * k, values, sizeof values);
+  }
+  Cloud cloud;
+  cloud.stamp_ns = stamp_ns;
+  cloud.frame_id = "lidar";
+  cloud.fields = {{"x", 0, 7}, {"y", 4, 7}, {"z", 8, 7}, {"intensity", 12, 7}};
+  cloud.width = static_cast<std::uint32_t>(scan.points.size());
+  cloud.height = 1;
+  cloud.point_step = 16;
+  cloud.row_step = 16 * cloud.width;
+  cloud.data = bytes->data();
+  cloud.size = bytes->size();
+  cloud.owner = bytes;
+  return cloud;
+}
+
+// Keeps what it is sent. The LiDAR is one metre ahead of the base and 1.5 above it, the IMU upside down beside it.
+class Listener final : public Outlet {
+ public:
+  void send(const Loop& loop) override { keep(loops, loop); }
+  void send(const Frame& frame) override { keep(frames, frame); }
+  void send(const MapPose& pose) override { keep(poses, pose); }
+  void send(const Graph& graph) override { keep(graphs, graph); }
+  void send(const MapCloud& cloud) override { keep(clouds, cloud); }
+  void send(const Health& state) override { keep(health, state); }
+  bool look_up(const std::string& target, const std::string& source, std::int64_t, bool,
+               Transform3& T_target_source) override {
+    T_target_source = Transform3::Identity();
+    if (target == "base_link" && source == "lidar" && knows_base) {
+      T_target_source.translation() << 1.0, 0.0, 1.5;
+      return true;
+    }
+    if (target == "lidar" && source == "imu") {
+      T_target_source.rotate(Eigen::AngleAxisd(kPi, Eigen::Vector3d::UnitX()));
+      return true;
+    }
+    return false;
+  }
+  void log(bool, const std::string& text) override { keep(lines, text); }
+  std::size_t count_of_poses() {
+    const std::lock_guard lock(mutex_);
+    return poses.size();
+  }
+  bool knows_base = true;
+
+  std::vector<Loop> loops;
+  std::vector<Frame> frames;
+  std::vector<MapPose> poses;
+  std::vector<Graph> graphs;
+  std::vector<MapCloud> clouds;
+  std::vector<Health> health;
+  std::vector<std::string> lines;
+
+ private:
+  template <typename Kind>
+  void keep(std::vector<Kind>& all, const Kind& one) {
+    const std::lock_guard lock(mutex_);
+    all.push_back(one);
+  }
+  std::mutex mutex_;
+};
+
+Settings settings_of(const std::string& mode) {
+  Settings settings;
+  settings.mode = mode;
+  settings.queue = 1000;
+  settings.parameters = {{"retrieval.exclude_s", "2"}, {"retrieval.exclude_frames", "20"}};
+  return settings;
+}
+
+// Sends scans first to last - 1 and waits for all of them.
+std::string drive(const Settings& settings, Listener& listener, int first, int last, bool with_odometry = false) {
+  std::string message;
+  const auto node = Node::make(settings, listener, message);
+  if (!node) return message;
+  for (int i = first; i < last; ++i) {
+    if (with_odometry) {
+      Pose T_base_lidar;
+      listener.look_up("base_link", "lidar", 0, false, T_base_lidar);
+      const Pose T_odom_base = SyntheticWorld::at(7.0, 3.0, 0.4, 0.0) * pose_of(i) * T_base_lidar.inverse();
+      node->add(Odometry{stamp_of(i), "wheels", "base_link", T_odom_base});
+    }
+    node->add(to_message(scan_of(i), stamp_of(i)));
+  }
+  EXPECT_TRUE(node->finish(message)) << message;
+  return {};
+}
+
+TEST(Node, DetectGivesTheLoopsOfTheLibrary) {
+  Listener listener;
+  EXPECT_EQ(drive(settings_of("detect"), listener, 0, kAll), "");
+  Parameters parameters;
+  parameters.retrieval.exclude_s = 2.0;
+  parameters.retrieval.exclude_frames = 20;
+  LoopDetector detector(parameters);
+  std::vector<LoopConstraint> expected;
+  for (int i = 0; i < kAll; ++i) {
+    Scan scan = scan_of(i);
+    scan.frame = FrameId{i};
+    scan.stamp_s = to_seconds(stamp_of(i));
+    const auto detection = detector.process(std::move(scan));
+    if (detection && detection->loop) expected.push_back(*detection->loop);
+  }
+  ASSERT_GT(expected.size(), 5u);
+  ASSERT_EQ(listener.loops.size(), expected.size());
+  for (std::size_t k = 0; k < expected.size(); ++k) {
+    const Loop& loop = listener.loops[k];
+    EXPECT_EQ(loop.query, expected[k].query.value);
+    EXPECT_EQ(loop.match, expected[k].match.value);
+    EXPECT_EQ(loop.query_stamp_ns, stamp_of(static_cast<int>(loop.query)));
+    EXPECT_EQ(loop.match_stamp_ns, stamp_of(static_cast<int>(loop.match)));
+    EXPECT_TRUE(loop.T_match_query.isApprox(expected[k].T_match_query, 1e-9));
+    EXPECT_TRUE((loop.covariance * expected[k].information).isIdentity(1e-2));
+  }
+}
+
+TEST(Node, SlamSaysWhereOdometryIsInTheMap) {
+  Listener listener;
+  EXPECT_EQ(drive(settings_of("slam"), listener, 0, 30, true), "");
+  ASSERT_EQ(listener.frames.size(), 30u);
+  ASSERT_EQ(listener.poses.size(), 30u);
+  for (int i = 0; i < 30; ++i) {
+    const Frame& frame = listener.frames[static_cast<std::size_t>(i)];
+    EXPECT_EQ(frame.stamp_ns, stamp_of(i));
+    EXPECT_EQ(frame.parent, "map");
+    EXPECT_EQ(frame.child, "wheels");
+    const Pose T_odom_lidar = SyntheticWorld::at(7.0, 3.0, 0.4, 0.0) * pose_of(i);
+    const Pose T_map_lidar = frame.T_parent_child * T_odom_lidar;
+    EXPECT_LT((T_map_lidar.translation() - (pose_of(0).inverse() * pose_of(i)).translation()).norm(), 0.1) << i;
+    EXPECT_TRUE(T_map_lidar.isApprox(listener.poses[static_cast<std::size_t>(i)].T_map_lidar, 1e-9));
+  }
+}
+
+TEST(Node, SlamGoesOnWhereItWasAndLosesNothing) {
+  Settings settings = settings_of("slam");
+  settings.map = (fresh_folder() / "map").string();
+  {
+    Listener listener;
+    EXPECT_EQ(drive(settings, listener, 0, kThere), "");
+    ASSERT_FALSE(listener.graphs.empty());
+  }
+  Listener refused;
+  EXPECT_NE(drive(settings, refused, kThere, kAll).find("resume"), std::string::npos);
+  settings.resume = true;
+  Listener listener;
+  EXPECT_EQ(drive(settings, listener, kThere, kAll), "");
+  ASSERT_FALSE(listener.loops.empty());
+  for (const Loop& loop : listener.loops)
+    EXPECT_NEAR(static_cast<double>(loop.match_stamp_ns - stamp_of(static_cast<int>(loop.match))), 0.0, 1000.0)
+        << "of a scan before it was stopped";
+  const Graph& graph = listener.graphs.back();
+  EXPECT_NEAR(static_cast<double>(graph.path.front().first - stamp_of(0)), 0.0, 1000.0);
+  EXPECT_LT((graph.path.back().second.translation() - (pose_of(0).inverse() * pose_of(kAll - 1)).translation()).norm(),
+            0.3);
+  EXPECT_FALSE(graph.loops.empty());
+}
+
+TEST(Node, LocaliseAnswersFromASavedMap) {
+  Settings settings = settings_of("slam");
+  settings.map = (fresh_folder() / "map").string();
+  Listener ignored;
+  EXPECT_EQ(drive(settings, ignored, 0, kThere), "");
+  settings.mode = "localise";
+  Listener listener;
+  EXPECT_EQ(drive(settings, listener, kThere, kAll), "");
+  EXPECT_GT(listener.poses.size(), 30u);
+  for (const MapPose& pose : listener.poses) {
+    const int i = static_cast<int>((pose.stamp_ns - kStart_ns) / 100'000'000);
+    EXPECT_LT(((pose_of(0).inverse() * pose_of(i)).inverse() * pose.T_map_lidar).translation().norm(), 0.3) << i;
+    EXPECT_GT(pose.covariance(0, 0), 0.0);
+  }
+  for (const Frame& frame : listener.frames) EXPECT_EQ(frame.child, "base_link") << "nobody told of odometry";
+  std::string message;
+  const auto node = Node::make(settings, listener, message);
+  ASSERT_TRUE(node) << message;
+  EXPECT_TRUE(node->publish_map(message)) << message;
+  EXPECT_GT(listener.clouds.at(0).points.size(), 4000u);
+  EXPECT_FALSE(node->save_map("", message)) << "nothing to save";
+}
+
+TEST(Node, ServicesWorkBesideScans) {
+  Settings settings = settings_of("slam");
+  settings.map = (fresh_folder() / "map").string();
+  Listener listener;
+  std::string message;
+  const auto node = Node::make(settings, listener, message);
+  ASSERT_TRUE(node) << message;
+  for (int i = 0; i < 20; ++i) node->add(to_message(scan_of(i), stamp_of(i)));
+  for (int tries = 0; tries < 2000 && listener.count_of_poses() < 10; ++tries)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  ASSERT_GE(listener.count_of_poses(), 10u);
+  EXPECT_TRUE(node->publish_map(message)) << message;
+  EXPECT_FALSE(listener.clouds.at(0).points.empty());
+  EXPECT_TRUE(node->save_map("", message)) << message;
+  EXPECT_TRUE(std::filesystem::exists(std::filesystem::path(settings.map) / "map.ply"));
+  EXPECT_FALSE(node->load_map(settings.map, message));
+  EXPECT_NE(message.find("localise"), std::string::npos);
+  EXPECT_TRUE(node->finish(message));
+  EXPECT_EQ(listener.poses.size(), 20u) << "none is lost";
+}
+
+// A frame has one parent: without odometry for a while, or without the LiDAR's place on the robot, nothing is said.
+TEST(Node, GivesNoFrameASecondParent) {
+  std::string message;
+  Listener listener, without_base;
+  {
+    const auto node = Node::make(settings_of("slam"), listener, message);
+    for (int i = 0; i < 20; ++i) {
+      if (i < 8) node->add(Odometry{stamp_of(i), "wheels", "base_link", SyntheticWorld::at(0.8 * i, 0.0, 0.0, 0.0)});
+      node->add(to_message(scan_of(i), stamp_of(i)));
+    }
+    EXPECT_TRUE(node->finish(message)) << message;
+  }
+  EXPECT_EQ(listener.poses.size(), 20u);
+  EXPECT_GE(listener.frames.size(), 8u);
+  EXPECT_LT(listener.frames.size(), 12u);
+  for (const Frame& frame : listener.frames) EXPECT_EQ(frame.child, "wheels");
+  without_base.knows_base = false;
+  EXPECT_EQ(drive(settings_of("slam"), without_base, 0, 5), "");
+  EXPECT_EQ(without_base.poses.size(), 5u);
+  EXPECT_TRUE(without_base.frames.empty());
+}
+
+TEST(Node, OdometryThatIsNoneIsLeftOut) {
+  Listener listener;
+  std::string message;
+  const auto node = Node::make(settings_of("slam"), listener, message);
+  const Eigen::Vector3d nowhere = Eigen::Vector3d::Constant(std::nan(""));
+  for (int i = 0; i < 6; ++i) {
+    node->add(Odometry{stamp_of(i), "wheels", "base_link",
+                       i % 2 == 0 ? to_transform(nowhere, Eigen::Quaterniond::Identity())
+                                  : to_transform(Eigen::Vector3d::Zero(), Eigen::Quaterniond(0.0, 0.0, 0.0, 0.0))});
+    node->add(to_message(scan_of(i), stamp_of(i)));
+  }
+  EXPECT_TRUE(node->finish(message)) << message;
+  EXPECT_EQ(listener.poses.size(), 6u);
+}
+
+TEST(Node, AStartThatSawNothingIsNoMap) {
+  Settings settings = settings_of("slam");
+  settings.map = (fresh_folder() / "map").string();
+  Listener nothing, listener;
+  EXPECT_EQ(drive(settings, nothing, 0, 0), "");
+  EXPECT_EQ(drive(settings, listener, 0, 5), "");
+  EXPECT_EQ(listener.poses.size(), 5u);
+}
+
+TEST(Node, SettingsByName) {
+  Settings settings;
+  std::string error;
+  EXPECT_TRUE(set(settings, "mode", "detect", error));
+  EXPECT_TRUE(set(settings, "map", "2024", error));
+  EXPECT_TRUE(set(settings, "resume", "1", error));
+  EXPECT_TRUE(set(settings, "queue", "7", error));
+  EXPECT_TRUE(settings.mode == "detect" && settings.map == "2024" && settings.resume && settings.queue == 7);
+  EXPECT_FALSE(set(settings, "resume", "perhaps", error));
+  EXPECT_NE(error.find("resume is 'perhaps'"), std::string::npos);
+  EXPECT_FALSE(set(settings, "queue", "0", error));
+  EXPECT_TRUE(set(settings, "retreival.top_k", "5", error));
+  Listener listener;
+  EXPECT_FALSE(Node::make(settings, listener, error));
+  EXPECT_NE(error.find("retrieval.top_k"), std::string::npos) << error;
+}
+
+TEST(Node, SaysWhatIsWrongWithItsSettings) {
+  Listener listener;
+  std::string message;
+  Settings settings = settings_of("fly");
+  EXPECT_FALSE(Node::make(settings, listener, message));
+  EXPECT_NE(message.find("'fly'; allowed: detect, slam, localise"), std::string::npos) << message;
+  settings = settings_of("detect");
+  settings.parameters["retrieval.top_k"] = "many";
+  EXPECT_FALSE(Node::make(settings, listener, message));
+  EXPECT_NE(message.find("retrieval.top_k"), std::string::npos) << message;
+  settings = settings_of("localise");
+  EXPECT_FALSE(Node::make(settings, listener, message));
+  EXPECT_NE(message.find("map"), std::string::npos) << message;
+}
+
+TEST(Node, ACloudThatIsNoneIsLeftOutAndCounted) {
+  Listener listener;
+  std::string message;
+  const auto node = Node::make(settings_of("detect"), listener, message);
+  ASSERT_TRUE(node) << message;
+  Cloud lying = to_message(scan_of(0), stamp_of(0));
+  lying.size /= 2;
+  node->add(std::move(lying));
+  node->add(to_message(scan_of(1), stamp_of(1)));
+  EXPECT_TRUE(node->finish(message));
+  std::map<std::string, std::string> values(listener.health.back().values.begin(), listener.health.back().values.end());
+  EXPECT_EQ(values.at("scans"), "2");
+  EXPECT_EQ(values.at("scans that could not be used"), "1");
+}
+
+TEST(NodeInbox, DropsTheOldestAndCounts) {
+  Inbox inbox(3);
+  for (int i = 0; i < 5; ++i) inbox.add(to_message({}, stamp_of(i)));
+  EXPECT_EQ(inbox.dropped(), 2u);
+  EXPECT_EQ(inbox.next()->stamp_ns, stamp_of(2));
+  inbox.close();
+  inbox.add(to_message({}, stamp_of(9)));
+  EXPECT_EQ(inbox.waiting(), 2u) << "those that wait are worked on, later ones are not";
+  EXPECT_FALSE(inbox.is_done());
+}
+
+TEST(NodeInbox, OdometryBetweenTwoMessages) {
+  Inbox inbox(1);
+  inbox.add(Odometry{stamp_of(0), "odom", "base_link", SyntheticWorld::at(0.0, 0.0, 0.0, 0.0)});
+  inbox.add(Odometry{stamp_of(1), "odom", "base_link", SyntheticWorld::at(1.0, 0.0, 0.4, 0.0)});
+  const auto between = inbox.odometry_at(stamp_of(0) + 25'000'000);
+  ASSERT_TRUE(between);
+  EXPECT_TRUE(between->T_odom_child.isApprox(SyntheticWorld::at(0.25, 0.0, 0.1, 0.0), 1e-6));
+  EXPECT_FALSE(inbox.odometry_at(stamp_of(20)));
+  inbox.add(Odometry{stamp_of(-100), "odom", "base_link", SyntheticWorld::at(5.0, 0.0, 0.0, 0.0)});
+  EXPECT_FALSE(inbox.odometry_at(stamp_of(1))) << "a bag begins anew: what was is forgotten";
+  EXPECT_TRUE(inbox.odometry_at(stamp_of(-100)));
+}
+
+TEST(NodeInbox, ReadingsThatOvertakeOthersLoseNone) {
+  Inbox inbox(1);
+  for (const int i : {0, 3, 1, 2, 2}) inbox.add(Imu{stamp_of(i), "imu", {}, {}});
+  const auto readings = inbox.imu_between(stamp_of(0), stamp_of(3));
+  ASSERT_EQ(readings.size(), 4u);
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(readings[static_cast<std::size_t>(i)].stamp_ns, stamp_of(i));
+}
+
+TEST(NodeMoments, ImuOfTheSweepComesInTheLidarsFrame) {
+  Listener listener;
+  Inbox inbox(1);
+  for (int k = -60; k <= 60; ++k)
+    inbox.add(Imu{stamp_of(0) + 10'000'000LL * k, "imu", {0.1, 0.2, 0.3}, {0.0, 0.0, -9.8}});
+  Moments moments(settings_of("slam"), inbox, listener);
+  Scan scan = scan_of(0);
+  scan.stamp_s = to_seconds(stamp_of(0));
+  const Moment moment = moments.of(to_message(scan, stamp_of(0)), scan);
+  EXPECT_TRUE(moment.T_base_lidar);
+  ASSERT_EQ(scan.imu.size(), 36u) << "a quarter of a second before, a tenth after";
+  EXPECT_NEAR(scan.imu.front().time_s, -0.25, 1e-9);
+  EXPECT_TRUE(scan.imu[0].acceleration_mps2.isApprox(Eigen::Vector3f(0.f, 0.f, 9.8f), 1e-5f));
+  EXPECT_TRUE(scan.imu[0].angular_radps.isApprox(Eigen::Vector3f(0.1f, -0.2f, -0.3f), 1e-5f));
+}
+
+}  // namespace
+}  // namespace revisit::node

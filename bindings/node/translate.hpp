@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include <revisit/core/gps_fix.hpp>
+#include <revisit/core/log.hpp>
+#include <revisit/core/result.hpp>
+#include <revisit/core/scan.hpp>
+
+#include "inbox.hpp"
+#include "mode.hpp"
+
+namespace revisit::node {
+
+Result<Scan> to_scan(const Cloud& cloud, std::int64_t number, const LogSink& log);
+revisit::GpsFix to_gps_fix(const GpsFix& fix);
+LogSink log_to(Outlet& outlet);
+
+/// What tf and the other sensors say of each scan. Belongs to the node's thread.
+class Moments {
+ public:
+  Moments(const Settings& settings, Inbox& inbox, Outlet& outlet);
+  /// Waits for what still comes. The scan gets its IMU readings.
+  Moment of(const Cloud& cloud, Scan& scan);
+
+ private:
+  bool look_up(const std::string& target, const std::string& source, std::int64_t stamp_ns, bool was_known,
+               Pose& T_target_source);
+  void find_odometry(const Cloud& cloud, Moment& moment);
+  struct Sweep {
+    double from_s = 0.0, to_s = 0.0;  ///< from the stamp
+  };
+  void add_imu(const Cloud& cloud, const Sweep& sweep, Scan& scan);
+
+  const std::string odom_frame_, base_frame_;
+  const bool publishes_poses_;
+  Inbox& inbox_;
+  Outlet& outlet_;
+  int scans_ = 0;
+  bool knew_base_ = false, had_odometry_ = false, has_warned_of_base_ = false, has_warned_of_imu_ = false;
+};
+
+}  // namespace revisit::node

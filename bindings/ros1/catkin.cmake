@@ -1,0 +1,25 @@
+# As a package of a catkin workspace: `ln -s PROJECT/bindings/ros1 src/revisit_ros`, then catkin_make.
+project(revisit_ros LANGUAGES C CXX)
+set(messages diagnostic_msgs geometry_msgs nav_msgs sensor_msgs std_msgs std_srvs visualization_msgs)
+find_package(catkin REQUIRED COMPONENTS message_generation roscpp tf2_ros ${messages})
+add_message_files(FILES Loop.msg)
+generate_messages(DEPENDENCIES geometry_msgs std_msgs)
+catkin_package(CATKIN_DEPENDS message_runtime roscpp tf2_ros ${messages})
+
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release)
+endif()
+foreach(part APPS TESTS BENCHMARKS EXAMPLES)
+  set(REVISIT_BUILD_${part} OFF)
+endforeach()
+get_filename_component(here ${CMAKE_CURRENT_LIST_DIR} REALPATH)
+add_subdirectory(${here}/../.. revisit EXCLUDE_FROM_ALL)
+
+add_executable(revisit_ros1 src/node.cpp)
+set_target_properties(revisit_ros1 PROPERTIES CXX_STANDARD 17 OUTPUT_NAME revisit_node)
+add_dependencies(revisit_ros1 revisit_ros_generate_messages_cpp)
+target_include_directories(revisit_ros1 SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+target_link_libraries(revisit_ros1 PRIVATE revisit_node ${catkin_LIBRARIES})
+
+install(TARGETS revisit_ros1 RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+install(DIRECTORY launch rviz DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})

@@ -1,0 +1,248 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""The ROS 1 node against a real master, a bag that rosbag plays, and the program on the same bag.
+
+usage: node_test.py REVISIT_PROGRAM NODE GENERATED_PYTHON_MESSAGES
+"""
+import csv
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+PROGRAM, NODE, MESSAGES = sys.argv[1:4]
+RATE = 4  # times as fast as it was driven
+EXCLUDE_S = "5.05"  # between two scans
+SCANS = 200
+
+
+def free_port():
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+WORK = tempfile.mkdtemp(prefix="revisit_ros1_")
+PORT = free_port()
+os.environ.update(ROS_MASTER_URI=f"http://127.0.0.1:{PORT}", ROS_IP="127.0.0.1", ROS_HOSTNAME="127.0.0.1",
+                  ROS_HOME=WORK, ROS_LOG_DIR=WORK, PYTHONUNBUFFERED="1")
+sys.path.insert(0, MESSAGES)
+
+import rosbag  # noqa: E402
+import rosgraph  # noqa: E402  (both read the environment)
+import rosnode  # noqa: E402
+import rospy  # noqa: E402
+import tf2_msgs.msg  # noqa: E402
+from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
+from geometry_msgs.msg import PoseWithCovarianceStamped  # noqa: E402
+from nav_msgs.msg import Path  # noqa: E402
+from revisit_ros.msg import Loop  # noqa: E402
+from sensor_msgs.msg import PointCloud2  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
+from visualization_msgs.msg import MarkerArray  # noqa: E402
+
+BAG = os.path.join(WORK, "warehouse.bag")
+MAP = os.path.join(WORK, "map")
+TOPICS = {"/revisit/loops": Loop, "/revisit/pose": PoseWithCovarianceStamped, "/revisit/path": Path, "/tf": tf2_msgs.msg.TFMessage,
+          "/revisit/graph": MarkerArray, "/revisit/map_cloud": PointCloud2, "/diagnostics": DiagnosticArray}
+
+
+def wait_until(condition, seconds=20):
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end:
+            raise AssertionError("waited in vain")
+        time.sleep(0.02)
+
+
+class Master:
+    def __init__(self):
+        self.process = subprocess.Popen(["rosmaster", "--core", "-p", str(PORT)], stdout=subprocess.DEVNULL,
+                                        stderr=subprocess.DEVNULL)
+        wait_until(rosgraph.is_master_online)
+
+    def stop(self):
+        self.process.send_signal(signal.SIGINT)
+        self.process.wait(10)
+
+
+def publish_frames():
+    """As robot_state_publisher does: a bag that is played from its middle has no frames."""
+    publisher = rospy.Publisher("/tf_static", tf2_msgs.msg.TFMessage, latch=True, queue_size=1)
+    with rosbag.Bag(BAG) as bag:
+        publisher.publish(next(message for _, message, _ in bag.read_messages(["/tf_static"])))
+    return publisher
+
+
+class Node:
+    """The node at work, and all that it publishes."""
+
+    def __init__(self, mode, *parameters, map=None):
+        self.heard = {topic: [] for topic in TOPICS}
+        self.subscribers = [rospy.Subscriber(topic, kind, self.heard[topic].append, queue_size=10000)
+                            for topic, kind in TOPICS.items()]
+        if rospy.has_param("/revisit"):
+            rospy.delete_param("/revisit")
+        arguments = [f"_mode:={mode}", f"_retrieval/exclude_s:={EXCLUDE_S}", *parameters]
+        if map:
+            arguments.append(f"_map:={map}")
+        self.log = open(os.path.join(WORK, "node.log"), "a+")
+        self.process = subprocess.Popen([NODE, *arguments], stdout=self.log, stderr=subprocess.STDOUT)
+        wait_until(lambda: all(s.get_num_connections() for s in self.subscribers[:2]))
+
+    def last(self, topic):
+        return self.heard[topic][-1]
+
+    def health(self):
+        wait_until(lambda: self.heard["/diagnostics"])
+        return {pair.key: pair.value for pair in self.last("/diagnostics").status[0].values}
+
+    def wait_for(self, scans):
+        wait_until(lambda: int(self.health()["scans"]) >= scans)
+
+    def call(self, name):
+        return rospy.ServiceProxy("/revisit/" + name, Trigger)()
+
+    def end(self, how=signal.SIGINT):
+        self.process.send_signal(how)
+        code = self.process.wait(30)
+        for each in self.subscribers:
+            each.unregister()
+        if how == signal.SIGKILL:
+            rosnode.cleanup_master_blacklist(rosgraph.Master("/test"), ["/revisit"])
+        return code
+
+
+def play(*options):
+    return subprocess.Popen(["/usr/lib/rosbag/play", "-q", "-r", str(RATE), "-d", "0.5", *options, BAG], stdout=subprocess.DEVNULL,
+                            stderr=subprocess.DEVNULL)
+
+
+def position_of(pose):
+    return pose.position.x, pose.position.y, pose.position.z
+
+
+class NodeTest(unittest.TestCase):
+    def assertNear(self, a, b, most):
+        self.assertLess(max(abs(x - y) for x, y in zip(a, b)), most)
+
+    def test_1_detect_gives_the_loops_of_the_program(self):
+        node = Node("detect")
+        self.assertEqual(play().wait(60), 0)
+        node.wait_for(SCANS)
+        self.assertEqual(node.end(), 0)
+        out = os.path.join(WORK, "detected")
+        subprocess.run([PROGRAM, "detect", BAG, "--out", out, "--retrieval.exclude_s", EXCLUDE_S], check=True,
+                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        with open(os.path.join(out, "loops.csv")) as file:
+            expected = {(int(row["query"]), int(row["match"])): row for row in csv.DictReader(file)}
+        heard = {(loop.query, loop.match): loop for loop in node.heard["/revisit/loops"]}
+        self.assertGreater(len(expected), 50)
+        self.assertEqual(set(heard), set(expected))
+        for pair, loop in heard.items():
+            row = expected[pair]
+            self.assertNear(position_of(loop.t_match_query.pose), [float(row[k]) for k in ("tx", "ty", "tz")], 1e-6)
+            self.assertNear([loop.header.stamp.to_sec(), loop.match_stamp.to_sec()], [0.1 * pair[0], 0.1 * pair[1]], 1e-6)
+            self.assertEqual(loop.header.frame_id, "lidar")
+            self.assertGreater(loop.probability, 0.5)
+            self.assertGreater(min(loop.t_match_query.covariance[7 * i] for i in range(6)), 0.0)
+
+    def test_2_slam_is_killed_and_resumed(self):
+        node = Node("slam", map=MAP)
+        player = play()
+        wait_until(lambda: len(node.heard["/revisit/pose"]) >= 80)
+        node.end(signal.SIGKILL)
+        player.kill()
+        player.wait()
+        before = node.last("/revisit/pose").header.stamp.to_sec()
+        again = Node("slam", map=MAP)
+        self.assertEqual(again.process.wait(30), 1, "a map that is there is not overwritten")
+        node = Node("slam", "_resume:=true", map=MAP)
+        self.assertEqual(play("-s", f"{before + 0.1:.1f}").wait(60), 0)
+        wait_until(lambda: node.heard["/revisit/pose"] and node.last("/revisit/pose").header.stamp.to_sec() > 19.85)
+        answer = node.call("publish_map")
+        self.assertTrue(answer.success, answer.message)
+        wait_until(lambda: node.heard["/revisit/map_cloud"])
+        cloud = node.last("/revisit/map_cloud")
+        self.assertGreater(cloud.width, 10000)
+        self.assertEqual(cloud.header.frame_id, "map")
+        answer = node.call("save_map")
+        self.assertTrue(answer.success, answer.message)
+        self.assertTrue(os.path.exists(os.path.join(MAP, "map.ply")))
+        # tf: the map above odometry, which the bag has as a topic.
+        frames = [t for message in node.heard["/tf"] for t in message.transforms]
+        self.assertEqual({(t.header.frame_id, t.child_frame_id) for t in frames if t.header.frame_id == "map"},
+                         {("map", "odom")})
+        # The path begins where the killed run began, and is where it was driven.
+        path = node.last("/revisit/path")
+        self.assertLess(path.poses[0].header.stamp.to_sec(), 1.0)
+        with open(BAG + ".poses.tum") as file:
+            truth = [[float(x) for x in line.split()] for line in file if line.strip() and not line.startswith("#")]
+        first, last = truth[0], truth[round(10 * path.poses[-1].header.stamp.to_sec())]
+        driven = sum((a - b) ** 2 for a, b in zip(first[1:4], last[1:4])) ** 0.5
+        found = sum(x * x for x in position_of(path.poses[-1].pose)) ** 0.5
+        self.assertLess(abs(found - driven), 0.3)
+        self.assertEqual(node.health()["scans left out, since too many waited"], "0")
+        self.assertEqual(node.end(), 0)
+
+    def test_3_localise_in_that_map(self):
+        node = Node("localise", map=MAP)
+        self.assertEqual(play("-s", "12").wait(60), 0)
+        wait_until(lambda: node.heard["/revisit/pose"] and node.last("/revisit/pose").header.stamp.to_sec() > 19.85)
+        self.assertGreater(len(node.heard["/revisit/pose"]), 60)
+        self.assertGreater(node.last("/revisit/pose").pose.covariance[0], 0.0)
+        answer = node.call("load_map")
+        self.assertTrue(answer.success, answer.message)
+        self.assertFalse(node.call("save_map").success)
+        wait_until(lambda: node.last("/diagnostics").status[0].message == "no scan yet")
+        self.assertEqual(play("-s", "12").wait(60), 0)
+        wait_until(lambda: node.last("/diagnostics").status[0].message.startswith("followed"))
+        self.assertEqual(node.end(), 0)
+
+    def test_4_goes_on_while_the_master_is_restarted(self):
+        global master
+        node = Node("detect")
+        player = play()
+        wait_until(lambda: int(node.health()["scans"]) >= 20)
+        master.stop()
+        master = Master()
+        self.assertEqual(player.wait(60), 0)
+        node.wait_for(SCANS)
+        self.assertEqual(node.end(), 0)
+
+    def test_5_says_what_is_wrong(self):
+        log = subprocess.run([NODE, "_mode:=fly"], capture_output=True, text=True, timeout=30)
+        self.assertEqual(log.returncode, 1)
+        self.assertIn("allowed: detect, slam, localise", log.stdout + log.stderr)
+        rospy.delete_param("/revisit")
+        log = subprocess.run([NODE, "_mode:=detect", "_retreival/top_k:=5"], capture_output=True, text=True, timeout=30)
+        self.assertEqual(log.returncode, 1)
+        self.assertIn("retrieval.top_k", log.stdout + log.stderr, "the nearest that there is")
+
+    def test_6_ends_without_a_master(self):
+        environment = dict(os.environ, ROS_MASTER_URI=f"http://127.0.0.1:{free_port()}")
+        node = subprocess.Popen([NODE, "_mode:=detect"], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(1)
+        node.send_signal(signal.SIGINT)
+        self.assertEqual(node.wait(10), 1)
+
+
+subprocess.run([PROGRAM, "simulate", "--out", BAG, "--world", "warehouse", "--frames", str(SCANS), "--sensor", "vlp16",
+                "--imu", "true", "--gps", "true", "--seed", "5"], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+master = Master()
+try:
+    rospy.init_node("test", anonymous=True, disable_signals=True)
+    frames = publish_frames()
+    result = unittest.main(argv=sys.argv[:1], verbosity=2, exit=False, warnings="ignore").result
+finally:
+    master.stop()
+    if len(sys.argv) < 5:
+        shutil.rmtree(WORK, ignore_errors=True)
+    else:
+        print("left:", WORK)
+os._exit(0 if result.wasSuccessful() else 1)  # rospy's threads wait for ever
