@@ -5,6 +5,7 @@
 usage: node_test.py REVISIT_PROGRAM NODE GENERATED_PYTHON_MESSAGES
 """
 import csv
+import math
 import os
 import shutil
 import signal
@@ -16,9 +17,10 @@ import time
 import unittest
 
 PROGRAM, NODE, MESSAGES = sys.argv[1:4]
-RATE = 4  # times as fast as it was driven
+RATE = 2  # times as fast as it was driven
 EXCLUDE_S = "5.05"  # between two scans
-SCANS = 200
+SCANS = 150
+LAST_S = 0.1 * (SCANS - 1) - 0.05
 
 
 def free_port():
@@ -142,7 +144,7 @@ class NodeTest(unittest.TestCase):
         with open(os.path.join(out, "loops.csv")) as file:
             expected = {(int(row["query"]), int(row["match"])): row for row in csv.DictReader(file)}
         heard = {(loop.query, loop.match): loop for loop in node.heard["/revisit/loops"]}
-        self.assertGreater(len(expected), 50)
+        self.assertGreater(len(expected), 20)
         self.assertEqual(set(heard), set(expected))
         for pair, loop in heard.items():
             row = expected[pair]
@@ -155,7 +157,7 @@ class NodeTest(unittest.TestCase):
     def test_2_slam_is_killed_and_resumed(self):
         node = Node("slam", map=MAP)
         player = play()
-        wait_until(lambda: len(node.heard["/revisit/pose"]) >= 80)
+        wait_until(lambda: len(node.heard["/revisit/pose"]) >= 85)
         node.end(signal.SIGKILL)
         player.kill()
         player.wait()
@@ -164,7 +166,7 @@ class NodeTest(unittest.TestCase):
         self.assertEqual(again.process.wait(30), 1, "a map that is there is not overwritten")
         node = Node("slam", "_resume:=true", map=MAP)
         self.assertEqual(play("-s", f"{before + 0.1:.1f}").wait(60), 0)
-        wait_until(lambda: node.heard["/revisit/pose"] and node.last("/revisit/pose").header.stamp.to_sec() > 19.85)
+        wait_until(lambda: node.heard["/revisit/pose"] and node.last("/revisit/pose").header.stamp.to_sec() > LAST_S)
         answer = node.call("publish_map")
         self.assertTrue(answer.success, answer.message)
         wait_until(lambda: node.heard["/revisit/map_cloud"])
@@ -184,23 +186,23 @@ class NodeTest(unittest.TestCase):
         with open(BAG + ".poses.tum") as file:
             truth = [[float(x) for x in line.split()] for line in file if line.strip() and not line.startswith("#")]
         first, last = truth[0], truth[round(10 * path.poses[-1].header.stamp.to_sec())]
-        driven = sum((a - b) ** 2 for a, b in zip(first[1:4], last[1:4])) ** 0.5
-        found = sum(x * x for x in position_of(path.poses[-1].pose)) ** 0.5
-        self.assertLess(abs(found - driven), 0.3)
+        yaw, dx, dy = 2 * math.atan2(first[6], first[7]), last[1] - first[1], last[2] - first[2]
+        driven = (math.cos(yaw) * dx + math.sin(yaw) * dy, math.cos(yaw) * dy - math.sin(yaw) * dx, last[3] - first[3])
+        self.assertNear(position_of(path.poses[-1].pose), driven, 0.3)
         self.assertEqual(node.health()["scans left out, since too many waited"], "0")
         self.assertEqual(node.end(), 0)
 
     def test_3_localise_in_that_map(self):
         node = Node("localise", map=MAP)
-        self.assertEqual(play("-s", "12").wait(60), 0)
-        wait_until(lambda: node.heard["/revisit/pose"] and node.last("/revisit/pose").header.stamp.to_sec() > 19.85)
-        self.assertGreater(len(node.heard["/revisit/pose"]), 60)
+        self.assertEqual(play("-s", "9").wait(60), 0)
+        wait_until(lambda: node.heard["/revisit/pose"] and node.last("/revisit/pose").header.stamp.to_sec() > LAST_S)
+        self.assertGreater(len(node.heard["/revisit/pose"]), 45)
         self.assertGreater(node.last("/revisit/pose").pose.covariance[0], 0.0)
         answer = node.call("load_map")
         self.assertTrue(answer.success, answer.message)
         self.assertFalse(node.call("save_map").success)
         wait_until(lambda: node.last("/diagnostics").status[0].message == "no scan yet")
-        self.assertEqual(play("-s", "12").wait(60), 0)
+        self.assertEqual(play("-s", "9").wait(60), 0)
         wait_until(lambda: node.last("/diagnostics").status[0].message.startswith("followed"))
         self.assertEqual(node.end(), 0)
 
@@ -229,7 +231,7 @@ class NodeTest(unittest.TestCase):
         node = subprocess.Popen([NODE, "_mode:=detect"], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         time.sleep(1)
         node.send_signal(signal.SIGINT)
-        self.assertEqual(node.wait(10), 1)
+        self.assertNotEqual(node.wait(10), 0)
 
 
 subprocess.run([PROGRAM, "simulate", "--out", BAG, "--world", "warehouse", "--frames", str(SCANS), "--sensor", "vlp16",

@@ -11,12 +11,18 @@
 namespace revisit::dds {
 namespace {
 
-// DDS writes from plain C structs, which it does not change.
+// DDS writes from plain C structs, which it does not change. They point at strings that must outlive them.
 char* text(const std::string& s) { return const_cast<char*>(s.c_str()); }
+char* text(const std::string&& s) = delete;
+const std::string& no_text() {
+  static const std::string none;
+  return none;
+}
 
 std_msgs_msg_dds__Header_ header_of(std::int64_t stamp_ns, const std::string& frame_id) {
   return {to_time(stamp_ns), text(frame_id)};
 }
+std_msgs_msg_dds__Header_ header_of(std::int64_t stamp_ns, const std::string&& frame_id) = delete;
 geometry_msgs_msg_dds__Quaternion_ quaternion_of(const node::Transform3& T) {
   const Eigen::Quaterniond q(T.linear());
   return {q.x(), q.y(), q.z(), q.w()};
@@ -129,10 +135,10 @@ void DdsOutlet::send(const node::Health& health) {
   std::vector<diagnostic_msgs_msg_dds__KeyValue_> values;
   for (const auto& [key, value] : health.values) values.push_back({text(key), text(value)});
   std::vector<diagnostic_msgs_msg_dds__DiagnosticStatus_> one{
-      {static_cast<std::uint8_t>(health.level), text(name_), text(health.message), text(""), {}}};
+      {static_cast<std::uint8_t>(health.level), text(name_), text(health.message), text(no_text()), {}}};
   one[0].values = sequence_of<decltype(one[0].values)>(values);
   DiagnosticArray message{};
-  message.header = header_of(now_ns(), "");
+  message.header = header_of(now_ns(), no_text());
   message.status = sequence_of<decltype(message.status)>(one);
   diagnostics_.write(message);
 }

@@ -200,7 +200,7 @@ struct BigCloud {
 };
 
 TEST(Dds, BigCloudsComeInAndPosesComeOut) {
-  constexpr int kScans = 40;
+  constexpr int kScans = 20;
   const SyntheticWorld world(61);
   const auto pose_at = [](int i) { return SyntheticWorld::at(-20.0 + 0.6 * i, 0.0, 0.0); };
   std::vector<Scan> scans;
