@@ -70,7 +70,7 @@ class ThreadedNode final : public Node {
     try {
       return ask();
     } catch (const std::exception& e) {
-      broken_ = std::string("the node stopped working, save nothing over the map and start it again: ") + e.what();
+      broken_ = std::string("the node works no more after an error; end it and start it with resume: ") + e.what();
       return Error{broken_};
     }
   }

@@ -67,7 +67,8 @@ Moment Moments::of(const Cloud& cloud, Scan& scan) {
   knew_base_ = knew_base_ || moment.T_base_lidar;
   if (!moment.T_base_lidar && publishes_poses_ && !std::exchange(has_warned_of_base_, true))
     outlet_.log(true, "tf does not say where " + cloud.frame_id + " is on " + base_frame_ +
-                          ": poses are published, but nothing in tf");
+                          ": poses are published, but no transform. Publish " + base_frame_ + " -> " + cloud.frame_id +
+                          " (the robot's URDF, or static_transform_publisher), or set base_frame to " + cloud.frame_id);
   find_odometry(cloud, moment);
   add_imu(cloud, sweep, scan);
   had_odometry_ = had_odometry_ || moment.T_odom_lidar;
@@ -110,7 +111,9 @@ void Moments::add_imu(const Cloud& cloud, const Sweep& sweep, Scan& scan) {
   const std::string& imu_frame = readings.back().frame_id;
   if (!look_up(cloud.frame_id, imu_frame, cloud.stamp_ns, false, T_lidar_imu)) {
     if (!std::exchange(has_warned_of_imu_, true))
-      outlet_.log(true, "tf does not say where " + imu_frame + " is to " + cloud.frame_id + ": the IMU is left out");
+      outlet_.log(true, "tf does not say where " + imu_frame + " is to " + cloud.frame_id +
+                            ": the IMU is left out. Publish the transform between them (the robot's URDF, or "
+                            "static_transform_publisher)");
     return;
   }
   const Eigen::Matrix3f R = T_lidar_imu.linear().cast<float>();

@@ -176,7 +176,7 @@ builtin_interfaces_msg_dds__Time_ time_of(std::int64_t ns) {
 }
 char* text(const char* s) { return const_cast<char*>(s); }
 
-// 1.6 MB, as an HDL-64E or an OS1-128 sends ten times a second.
+// 1.3 MB, as sensors of 64 lines send ten times a second.
 struct BigCloud {
   explicit BigCloud(const Scan& scan, std::int64_t stamp_ns) : bytes(16 * scan.points.size()) {
     for (std::size_t k = 0; k < scan.points.size(); ++k) {

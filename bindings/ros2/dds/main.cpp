@@ -90,7 +90,12 @@ int run(const node::Settings& settings, const Topics& topics, const std::string&
 int main(int argc, char** argv) {
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { is_asked_to_end = 1; });
   CLI::App app(
-      "A node that speaks to ROS 2 without ROS 2: its topics over Cyclone DDS. Ends with Ctrl-C, and keeps the map.");
+      "Places, map or pose from the point clouds of ROS 2, on a machine without ROS 2: speaks to its nodes over "
+      "Cyclone "
+      "DDS. Ctrl-C ends it; the map is settled and closed.");
+  app.footer(
+      "Publishes NAME/loops, NAME/pose, NAME/path, /tf and /diagnostics.\n\n"
+      "Example: revisit_dds_node --mode slam --map maps/yard --points /ouster/points --imu /ouster/imu");
   revisit::node::Settings settings;
   Topics topics;
   std::string name = "/revisit";
@@ -103,9 +108,12 @@ int main(int argc, char** argv) {
   app.add_option("--imu", topics.imu, "sensor_msgs/Imu; none is fine")->capture_default_str();
   app.add_option("--odom", topics.odom, "nav_msgs/Odometry; none is fine")->capture_default_str();
   app.add_option("--fix", topics.fix, "sensor_msgs/NavSatFix; none is fine")->capture_default_str();
-  app.add_option("--map-frame", settings.map_frame)->capture_default_str();
-  app.add_option("--odom-frame", settings.odom_frame)->capture_default_str();
-  app.add_option("--base-frame", settings.base_frame)->capture_default_str();
+  app.add_option("--map-frame", settings.map_frame, "Frame of the map in tf")->capture_default_str();
+  app.add_option("--odom-frame", settings.odom_frame, "Frame of odometry in tf, where its messages name none")
+      ->capture_default_str();
+  app.add_option("--base-frame", settings.base_frame,
+                 "Frame of the robot in tf; /tf_static must say where the LiDAR is on it")
+      ->capture_default_str();
   app.add_option("--queue", settings.queue, "Scans that may wait")->capture_default_str();
   app.add_option("--name", name, "Before the names of the topics that it publishes")->capture_default_str();
   app.add_option("--domain", domain, "ROS_DOMAIN_ID")->envname("ROS_DOMAIN_ID")->capture_default_str();
