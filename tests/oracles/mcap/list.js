@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the format's own library finds in .mcap files: a line a message, with topic, type, time and a checksum.
 import { open } from "node:fs/promises";
-import { crc32 } from "node:zlib";
+import zlib from "node:zlib";
 import { McapIndexedReader, McapStreamReader } from "@mcap/core";
 import { FileHandleReadable } from "@mcap/nodejs";
 import { loadDecompressHandlers } from "@mcap/support";
@@ -12,7 +12,7 @@ const table = new Uint32Array(256).map((_, i) => {
   return value;
 });
 function checksum(bytes) {
-  if (crc32 !== undefined) return crc32(bytes);
+  if (zlib.crc32 !== undefined) return zlib.crc32(bytes);
   let value = 0xffffffff;
   for (const byte of bytes) value = (value >>> 8) ^ table[(value ^ byte) & 255];
   return (value ^ 0xffffffff) >>> 0;
@@ -42,4 +42,6 @@ try {
     if (record.type === "Channel") channels.set(record.id, record);
     if (record.type === "Message") print(record);
   }
+} finally {
+  await handle.close();  // one that is left to the garbage collector is warned of
 }
