@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <set>
+#include <utility>
 
 #include <revisit/mapping/internal/moving_points.hpp>
 
@@ -28,11 +29,10 @@ struct Votes {
 
 Eigen::Vector3f position(const Point& p) { return {p.x, p.y, p.z}; }
 
-Votes ask(std::span<const VisibilityImage> images, std::span<const Eigen::Isometry3f> T_visit_place,
-          const Eigen::Vector3f& p) {
+Votes ask(std::span<const Visit> visits, std::span<const Eigen::Isometry3f> T_visit_place, const Eigen::Vector3f& p) {
   Votes votes;
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    const Verdict verdict = images[i].look(T_visit_place[i] * p);
+  for (std::size_t i = 0; i < visits.size(); ++i) {
+    const Verdict verdict = visits[i].seen->image().look(T_visit_place[i] * p);
     votes.through += verdict == Verdict::kThrough;
     votes.surface += verdict == Verdict::kSurface;
   }
@@ -59,15 +59,17 @@ bool is_beside(const Voxels& voxels, const Voxel& at) {
 
 }  // namespace
 
+SeenFromKeyframe::SeenFromKeyframe(std::vector<Point> points)
+    : points_(std::move(points)), image_(std::make_unique<const VisibilityImage>(points_)) {}
+
+SeenFromKeyframe::~SeenFromKeyframe() = default;
+
 bool update_place(PlacePoints& place, std::span<const Visit> visits, int session) {
   const auto now = static_cast<std::uint16_t>(session);
-  std::vector<VisibilityImage> images;
   std::vector<Eigen::Isometry3f> T_visit_place;
-  images.reserve(visits.size());
-  for (const Visit& each : visits) {
-    images.emplace_back(each.points);
+  T_visit_place.reserve(visits.size());
+  for (const Visit& each : visits)
     T_visit_place.emplace_back((each.T_map_lidar.inverse() * place.T_map_lidar).cast<float>());
-  }
   // What the place itself saw, as the map has it now.
   std::vector<Point> standing;
   Voxels occupied, added;
@@ -79,7 +81,7 @@ bool update_place(PlacePoints& place, std::span<const Visit> visits, int session
     const Eigen::Vector3f p = position(place.points[i]);
     occupied.insert(voxel_of(p));
     if (p.norm() > Comparing::kFarthest_m) continue;
-    const Votes votes = ask(images, T_visit_place, p);
+    const Votes votes = ask(visits, T_visit_place, p);
     if (votes.is_gone()) {
       is_changed = true;
       if (++history.missed >= kVisitsUntilGone) history.gone = now;
@@ -91,11 +93,11 @@ bool update_place(PlacePoints& place, std::span<const Visit> visits, int session
   const VisibilityImage own(standing);
   for (std::size_t i = 0; i < visits.size(); ++i) {
     const Eigen::Isometry3f T_place_visit = T_visit_place[i].inverse();
-    for (const Point& each : visits[i].points) {
+    for (const Point& each : visits[i].seen->points()) {
       const Eigen::Vector3f p = T_place_visit * position(each);
       if (p.norm() > Comparing::kFarthest_m || own.look(p) != Verdict::kThrough) continue;
       const Voxel voxel = voxel_of(p);
-      if (is_beside(occupied, voxel) || added.contains(voxel) || !ask(images, T_visit_place, p).is_there()) continue;
+      if (is_beside(occupied, voxel) || added.contains(voxel) || !ask(visits, T_visit_place, p).is_there()) continue;
       added.insert(voxel);
       place.points.push_back({p.x(), p.y(), p.z(), each.intensity});
       place.history.push_back({now, PointHistory::kNever, 0});

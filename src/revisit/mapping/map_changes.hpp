@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -10,6 +11,10 @@
 
 namespace revisit {
 
+namespace mapping_internal {
+class VisibilityImage;
+}
+
 /// The points of a place, in its frame, with the history of each.
 struct PlacePoints {
   Pose T_map_lidar = Pose::Identity();
@@ -17,10 +22,23 @@ struct PlacePoints {
   std::vector<PointHistory> history;
 };
 
-/// What a session saw from a key frame, in its frame.
+/// What a session saw from a key frame, in its frame, to be compared with several places. It does not change: threads
+/// may share it.
+class SeenFromKeyframe {
+ public:
+  explicit SeenFromKeyframe(std::vector<Point> points);
+  ~SeenFromKeyframe();
+  const std::vector<Point>& points() const { return points_; }
+  const mapping_internal::VisibilityImage& image() const { return *image_; }
+
+ private:
+  std::vector<Point> points_;
+  std::unique_ptr<const mapping_internal::VisibilityImage> image_;
+};
+
 struct Visit {
   Pose T_map_lidar = Pose::Identity();
-  std::vector<Point> points;
+  std::shared_ptr<const SeenFromKeyframe> seen;
 };
 
 /// Visits after which what they saw through is no longer part of the map.

@@ -36,7 +36,8 @@ std::vector<Point> seen_from(double x, bool with_box) {
 
 std::vector<Visit> drive_by(bool with_box) {
   std::vector<Visit> visits;
-  for (const double x : {-2.0, 0.5, 2.5, 4.0}) visits.push_back({at(x), seen_from(x, with_box)});
+  for (const double x : {-2.0, 0.5, 2.5, 4.0})
+    visits.push_back({at(x), std::make_shared<SeenFromKeyframe>(seen_from(x, with_box))});
   return visits;
 }
 

@@ -44,6 +44,7 @@ Result<Detection> PlaceRecognition::find(const PreparedScan& query, std::size_t 
 VerificationContext PlaceRecognition::context(const TypicalAgreement& typical) const {
   return {.parameters = parameters_,
           .clouds = *clouds_,
+          .geometries = geometries_,
           .query_descriptor = [this](FrameId frame) -> std::optional<DescriptorView> {
             const auto found = std::find_if(recent_queries_.begin(), recent_queries_.end(),
                                             [&](const RecentQuery& each) { return each.frame == frame; });
@@ -70,9 +71,12 @@ Result<Hypothesis> PlaceRecognition::test(const PreparedScan& query, const PoseP
 }
 
 Result<std::shared_ptr<const ScanGeometry>> PlaceRecognition::geometry(FrameId place) const {
+  if (auto known = geometries_.find(place)) return known;
   const auto cloud = clouds_->get(place);
   if (!cloud) return cloud.error();
-  return std::make_shared<const ScanGeometry>(**cloud);
+  auto geometry = std::make_shared<const ScanGeometry>(**cloud);
+  geometries_.keep(place, geometry);
+  return geometry;
 }
 
 Status PlaceRecognition::verify(const PreparedScan& query, const TypicalAgreement& typical, Detection& detection) {

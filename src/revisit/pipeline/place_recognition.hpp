@@ -61,6 +61,7 @@ class PlaceRecognition {
   Parameters parameters_;
   PlaceIndex index_;
   std::unique_ptr<PlaceClouds> clouds_;
+  mutable PlaceGeometries geometries_;
   TrajectoryPoints points_;  ///< of all places
   LoopFollowing following_;
   LookAlikes look_alikes_;

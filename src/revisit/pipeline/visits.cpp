@@ -4,6 +4,12 @@
 #include <algorithm>
 #include <deque>
 #include <map>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <oneapi/tbb/parallel_for.h>
 
 #include <revisit/mapping/map_changes.hpp>
 #include <revisit/store/keyframe_bytes.hpp>
@@ -15,6 +21,7 @@ struct Comparing {
   static constexpr double kNear_m = 8.0;         ///< visits of a place
   static constexpr std::size_t kMostVisits = 8;  ///< the nearest of them
   static constexpr std::size_t kKept = 64;       ///< clouds in memory
+  static constexpr std::size_t kAtOnce = 32;     ///< places
 };
 
 // What key frames of the session at work saw; of the last few, in memory.
@@ -22,16 +29,16 @@ class VisitClouds {
  public:
   explicit VisitClouds(const MapStore& store) : store_(store) {}
 
-  Result<const std::vector<Point>*> get(FrameId frame) {
-    if (const auto found = clouds_.find(frame); found != clouds_.end()) return &found->second;
+  Result<std::shared_ptr<const SeenFromKeyframe>> get(FrameId frame) {
+    if (const auto found = seen_.find(frame); found != seen_.end()) return found->second;
     auto points = read(frame);
     if (!points) return points.error();
     if (order_.size() == Comparing::kKept) {
-      clouds_.erase(order_.front());
+      seen_.erase(order_.front());
       order_.pop_front();
     }
     order_.push_back(frame);
-    return &(clouds_[frame] = *std::move(points));
+    return seen_[frame] = std::make_shared<const SeenFromKeyframe>(*std::move(points));
   }
 
  private:
@@ -45,7 +52,7 @@ class VisitClouds {
   }
 
   const MapStore& store_;
-  std::map<FrameId, std::vector<Point>> clouds_;
+  std::map<FrameId, std::shared_ptr<const SeenFromKeyframe>> seen_;
   std::deque<FrameId> order_;
 };
 
@@ -72,21 +79,48 @@ std::vector<FrameId> visits_near(const KeyframeGraph& graph, const std::vector<V
   return frames;
 }
 
-Status compare_place(MapStore& store, const KeyframeGraph& graph, VisitClouds& clouds, FrameId place,
-                     const std::vector<FrameId>& visitors, int session) {
+// A place and what is compared with it.
+struct Comparison {
+  FrameId frame;
+  PlacePoints place;
+  std::vector<Visit> visits;
+  bool is_changed = false;
+};
+
+// Nothing where it was compared already.
+Result<std::optional<Comparison>> read_comparison(const MapStore& store, const KeyframeGraph& graph,
+                                                  VisitClouds& clouds, FrameId place,
+                                                  const std::vector<FrameId>& visitors, int session) {
   auto stored = read_place_points(store, place);
   if (!stored) return stored.error();
-  if (stored->compared_with >= session) return ok();
-  std::vector<Visit> visits;
-  visits.reserve(visitors.size());
+  if (stored->compared_with >= session) return std::optional<Comparison>();
+  std::optional<Comparison> read(std::in_place);
+  read->frame = place;
+  read->place = {graph.T_world_lidar(place), std::move(stored->points), std::move(stored->history)};
+  read->visits.reserve(visitors.size());
   for (const FrameId each : visitors) {
-    const auto points = clouds.get(each);
-    if (!points) return points.error();
-    visits.push_back({graph.T_world_lidar(each), **points});
+    auto seen = clouds.get(each);
+    if (!seen) return seen.error();
+    read->visits.push_back({graph.T_world_lidar(each), *std::move(seen)});
   }
-  PlacePoints points{graph.T_world_lidar(place), std::move(stored->points), std::move(stored->history)};
-  if (!update_place(points, visits, session)) return ok();
-  return write_place_points(store, place, {std::move(points.points), std::move(points.history), session});
+  return read;
+}
+
+// Places change on their own, in parallel; they are written in their order.
+Status compare(MapStore& store, std::vector<Comparison>& comparisons, int session) {
+  tbb::parallel_for(std::size_t{0}, comparisons.size(), [&](std::size_t i) {
+    comparisons[i].is_changed = update_place(comparisons[i].place, comparisons[i].visits, session);
+  });
+  for (Comparison& each : comparisons) {
+    if (!each.is_changed) continue;
+    PlacePoints& points = each.place;
+    if (Status written =
+            write_place_points(store, each.frame, {std::move(points.points), std::move(points.history), session});
+        !written)
+      return written;
+  }
+  comparisons.clear();
+  return ok();
 }
 
 }  // namespace
@@ -104,12 +138,18 @@ Status compare_with_visits(MapStore& store, const KeyframeGraph& graph, int sess
       if (session_of(each) == session && graph.has(each))
         visitors.push_back({each, graph.part(each), graph.T_world_lidar(each).translation()});
   VisitClouds clouds(store);
+  std::vector<Comparison> comparisons;
   for (const FrameId place : *places) {
     if (session_of(place) == session || !graph.has(place)) continue;
     const std::vector<FrameId> near = visits_near(graph, visitors, place);
     if (near.size() < 2) continue;
-    if (Status compared = compare_place(store, graph, clouds, place, near, session); !compared) return compared;
+    auto read = read_comparison(store, graph, clouds, place, near, session);
+    if (!read) return read.error();
+    if (*read) comparisons.push_back(**std::move(read));
+    if (comparisons.size() < Comparing::kAtOnce) continue;
+    if (Status compared = compare(store, comparisons, session); !compared) return compared;
   }
+  if (Status compared = compare(store, comparisons, session); !compared) return compared;
   return store.forget_visits();
 }
 

@@ -5,6 +5,8 @@
 #include <bit>
 #include <cmath>
 
+#include <oneapi/tbb/parallel_for.h>
+
 #include <revisit/bits/occupancy_bits.h>
 
 namespace revisit {
@@ -128,16 +130,20 @@ OverheadImage overhead_image(const ThinCloud& cloud, double cell_m, double yaw_r
   return image;
 }
 
-const OverheadSearch::Turned& OverheadSearch::turned(int step) {
-  auto [found, is_new] = turns_.try_emplace((step % kSteps + kSteps) % kSteps);
-  if (is_new) found->second.image = overhead_image(query_, cell_m_, found->first * kStep_rad);
-  return found->second;
+OverheadSearch::OverheadSearch(const ThinCloud& query)
+    : query_(query), query_sector_(query.seen.sector()), turns_(kSteps) {}
+
+OverheadSearch::Turned& OverheadSearch::turned(int step) {
+  const int whole = (step % kSteps + kSteps) % kSteps;
+  Turned& turn = turns_[static_cast<std::size_t>(whole)];
+  if (!turn.image) turn.image = overhead_image(query_, cell_m_, whole * kStep_rad);
+  return turn;
 }
 
 const OverheadImage& OverheadSearch::moved(int step, int x) {
-  auto& turn = turns_.at((step % kSteps + kSteps) % kSteps);
+  Turned& turn = turned(step);
   auto [found, is_new] = turn.moved_along_x.try_emplace(x);
-  if (is_new) found->second = moved_along_x(turn.image, x);
+  if (is_new) found->second = moved_along_x(*turn.image, x);
   return found->second;
 }
 
@@ -147,7 +153,7 @@ OverheadMatch OverheadSearch::match_at(const OverheadImage& place, const Overhea
   const OverheadImage& query = moved(at.step, at.x);
   if (place_sector_.is_all_round() && query_sector_.is_all_round()) {
     const std::uint64_t back = common(place, grown(query), at.y);
-    match.overlap = std::min(share(at.shared, turned(at.step).image.count), share(back, place.count));
+    match.overlap = std::min(share(at.shared, turned(at.step).image->count), share(back, place.count));
     return match;
   }
   // Of each only what lies where the other one looks.
@@ -165,21 +171,39 @@ OverheadMatch OverheadSearch::match_at(const OverheadImage& place, const Overhea
 // The best of `at` and all that lie one step beside it.
 OverheadSearch::At OverheadSearch::climb(const OverheadImage& place_grown, const At& at) {
   At best = at;
-  for (int step = at.step - 1; step <= at.step + 1; ++step) {
-    turned(step);
+  for (int step = at.step - 1; step <= at.step + 1; ++step)
     for (int x = at.x - 1; x <= at.x + 1; ++x)
       for (int y = at.y - 1; y <= at.y + 1; ++y) {
         const auto shared = static_cast<std::uint32_t>(common(place_grown, moved(step, x), y));
         if (shared > best.shared) best = {step, x, y, shared};
       }
-  }
   return best;
+}
+
+// Images are grown by a cell, so that every other heading and cell shows where to look closely.
+void OverheadSearch::try_headings(const OverheadImage& place_grown, int first_step, int last_step, int reach_cells) {
+  const auto side = static_cast<std::size_t>(2 * reach_cells / Coarse::kCells + 1);
+  const auto headings = static_cast<std::size_t>((last_step - first_step) / Coarse::kSteps + 1);
+  coarse_.resize(headings * side * side);
+  // Steps that are a whole turn apart share their images: only one of the two is tried beside others.
+  const auto one_heading = [&](std::size_t heading) {
+    const int step = first_step + static_cast<int>(heading) * Coarse::kSteps;
+    At* at = coarse_.data() + heading * side * side;
+    for (int x = -reach_cells; x <= reach_cells; x += Coarse::kCells) {
+      const OverheadImage& query = moved(step, x);
+      for (int y = -reach_cells; y <= reach_cells; y += Coarse::kCells)
+        *at++ = {step, x, y, static_cast<std::uint32_t>(common(place_grown, query, y))};
+    }
+  };
+  const bool comes_round = last_step - first_step == kSteps;
+  tbb::parallel_for(std::size_t{0}, comes_round ? headings - 1 : headings, one_heading);
+  if (comes_round) one_heading(headings - 1);
 }
 
 std::vector<OverheadMatch> OverheadSearch::search(const ThinCloud& match, double yaw_rad, double yaw_reach_rad,
                                                   double reach_m, std::size_t wanted) {
   const auto cell_m = static_cast<double>(std::max(match.voxel_m, query_.voxel_m));
-  if (cell_m != cell_m_) turns_.clear();
+  if (cell_m != cell_m_) turns_.assign(kSteps, {});
   cell_m_ = cell_m;
   place_sector_ = match.seen.sector();
   if (!place_sector_.is_all_round()) seen_by_place_ = image_of(place_sector_, match.up, 0.0, 0);
@@ -187,16 +211,7 @@ std::vector<OverheadMatch> OverheadSearch::search(const ThinCloud& match, double
   const int reach_cells = static_cast<int>(std::lround(reach_m / cell_m));
   const auto nearest = static_cast<int>(std::lround(yaw_rad / kStep_rad));
   const int reach = std::min(static_cast<int>(std::floor(yaw_reach_rad / kStep_rad + 1e-9)), kSteps / 2);
-  // Images are grown by a cell, so that every other heading and cell shows where to look closely.
-  coarse_.clear();
-  for (int step = nearest - reach; step <= nearest + reach; step += Coarse::kSteps) {
-    turned(step);
-    for (int x = -reach_cells; x <= reach_cells; x += Coarse::kCells) {
-      const OverheadImage& query = moved(step, x);
-      for (int y = -reach_cells; y <= reach_cells; y += Coarse::kCells)
-        coarse_.push_back({step, x, y, static_cast<std::uint32_t>(common(place_grown, query, y))});
-    }
-  }
+  try_headings(place_grown, nearest - reach, nearest + reach, reach_cells);
   std::vector<At> found;
   while (found.size() < std::max<std::size_t>(1, wanted)) {
     const At most =

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include <revisit/core/pose.hpp>
@@ -33,10 +34,10 @@ struct OverheadMatch {
 
 /// A query scan laid on places from above, to find where it stands before registration: headings in steps of 3 degrees
 /// and positions in steps of a cell, every other one tried first; cells are the larger voxels of both scans. Images of
-/// its turns are kept from place to place: one object for each thread.
+/// its turns are kept from place to place. Belongs to one thread at a time; headings are tried in parallel.
 class OverheadSearch {
  public:
-  explicit OverheadSearch(const ThinCloud& query) : query_(query), query_sector_(query.seen.sector()) {}
+  explicit OverheadSearch(const ThinCloud& query);
 
   /// Of all headings within `yaw_reach_rad` of `yaw_rad`, at positions up to `reach_m` (less than 63 cells) along x and
   /// y: the pose at which the scans share most cells, and the next best ones that lie more than 3 cells or 12 degrees
@@ -46,15 +47,16 @@ class OverheadSearch {
 
  private:
   struct Turned {
-    OverheadImage image;
+    std::optional<OverheadImage> image;
     std::map<int, OverheadImage> moved_along_x;  ///< by cells
   };
   struct At {
     int step, x, y;  ///< heading in steps, position in cells
     std::uint32_t shared;
   };
-  const Turned& turned(int step);
-  const OverheadImage& moved(int step, int x);  ///< of a turn that was asked for
+  void try_headings(const OverheadImage& place_grown, int first_step, int last_step, int reach_cells);
+  Turned& turned(int step);
+  const OverheadImage& moved(int step, int x);
   OverheadMatch match_at(const OverheadImage& place, const OverheadImage& place_grown, const At& at);
   At climb(const OverheadImage& place_grown, const At& at);
   static bool is_beside(const At& a, const At& b);
@@ -63,8 +65,8 @@ class OverheadSearch {
   SeenSpace::Sector query_sector_, place_sector_;
   OverheadImage seen_by_place_;  ///< where the place's sensor looks, if not all round
   double cell_m_ = 0.0;
-  std::map<int, Turned> turns_;  ///< in cells of cell_m_
-  std::vector<At> coarse_;       ///< of the search at work
+  std::vector<Turned> turns_;  ///< by steps of the heading, in cells of cell_m_; made when asked for
+  std::vector<At> coarse_;     ///< of the search at work
 };
 
 }  // namespace revisit

@@ -102,6 +102,7 @@ Result<Hypothesis> CandidateRegistration::test(const PosePrediction& prediction)
   hypothesis->T_guess_match_query = prediction.T_match_query;
   check_temporal_consistency(*hypothesis);
   query_geometry();
+  share_geometry({&*hypothesis, 1});
   if (!hypothesis->refusal) register_scans(*hypothesis, &prediction);
   return hypothesis;
 }
@@ -113,31 +114,36 @@ Result<std::optional<double>> CandidateRegistration::log_odds_elsewhere(FrameId 
   Hypothesis found = search_overhead(*hypothesis, kPi, 1).front();
   if (found.overlap < options_.min_overlap) return std::optional(LookAlikes::kNotRegistered);
   query_geometry();
+  share_geometry({&found, 1});
   register_scans(found);
   const Pose error = T_place_query.inverse() * found.geometric->T_match_query;
   if (error.translation().norm() < kRight_m) return std::optional<double>();
   return std::optional(loop_log_odds(found.geometric->evidence));
 }
 
-// Poses at the same place share its geometry.
-void CandidateRegistration::share_geometry(std::vector<Hypothesis>& hypotheses) const {
+// Poses at the same place share its geometry, and so do queries that follow.
+void CandidateRegistration::share_geometry(std::span<Hypothesis> hypotheses) const {
   std::map<FrameId, std::shared_ptr<const ScanGeometry>> of_place;
   for (const Hypothesis& each : hypotheses)
     if (!each.refusal) of_place[each.candidate.match];
-  std::vector<FrameId> places;
-  places.reserve(of_place.size());
-  for (const auto& [place, none] : of_place) places.push_back(place);
-  tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t i) {
-    const auto at = std::find_if(hypotheses.begin(), hypotheses.end(),
-                                 [&](const Hypothesis& each) { return each.candidate.match == places[i]; });
-    of_place.at(places[i]) = std::make_shared<ScanGeometry>(*at->place);
+  std::vector<const Hypothesis*> unknown;
+  for (auto& [place, geometry] : of_place) {
+    geometry = context_.geometries.find(place);
+    if (!geometry)
+      unknown.push_back(&*std::find_if(hypotheses.begin(), hypotheses.end(), [&place = place](const Hypothesis& each) {
+        return each.candidate.match == place;
+      }));
+  }
+  tbb::parallel_for(std::size_t{0}, unknown.size(), [&](std::size_t i) {
+    of_place.at(unknown[i]->candidate.match) = std::make_shared<const ScanGeometry>(*unknown[i]->place);
   });
+  for (const Hypothesis* each : unknown)
+    context_.geometries.keep(each->candidate.match, of_place.at(each->candidate.match));
   for (Hypothesis& each : hypotheses)
     if (!each.refusal) each.geometry = of_place.at(each.candidate.match);
 }
 
 void CandidateRegistration::register_scans(Hypothesis& hypothesis, const PosePrediction* prediction) const {
-  if (!hypothesis.geometry) hypothesis.geometry = std::make_shared<ScanGeometry>(*hypothesis.place);
   hypothesis.geometric =
       check_geometric(*hypothesis.geometry, *query_geometry_,
                       {hypothesis.T_guess_match_query, hypothesis.overlap, context_.typical}, options_);

@@ -28,6 +28,7 @@ struct VerificationQuery {
 struct VerificationContext {
   const Parameters& parameters;
   PlaceClouds& clouds;
+  PlaceGeometries& geometries;
   DescriptorLookup query_descriptor, place_descriptor;  ///< of the queries before, and of the places
   const TrajectoryPoints& places;
   const LoopFollowing& following;
@@ -62,7 +63,7 @@ class CandidateRegistration {
  private:
   Result<Hypothesis> open(const LoopCandidate& candidate) const;
   std::vector<Hypothesis> search_overhead(const Hypothesis& of_place, double yaw_reach_rad, std::size_t wanted);
-  void share_geometry(std::vector<Hypothesis>& hypotheses) const;
+  void share_geometry(std::span<Hypothesis> hypotheses) const;
   void check_temporal_consistency(Hypothesis& hypothesis) const;
   void register_scans(Hypothesis& hypothesis, const PosePrediction* prediction = nullptr) const;
   Pose from_upright(const Hypothesis& hypothesis, const Pose& T_match_query_upright) const;

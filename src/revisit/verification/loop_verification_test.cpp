@@ -43,6 +43,7 @@ class LoopVerificationTest : public testing::Test {
   VerificationContext context() {
     return {.parameters = parameters_,
             .clouds = *clouds_,
+            .geometries = geometries_,
             .query_descriptor = [](FrameId) { return std::nullopt; },
             .place_descriptor = [this](FrameId frame) -> std::optional<DescriptorView> {
               const auto found = descriptors_.find(frame);
@@ -66,6 +67,7 @@ class LoopVerificationTest : public testing::Test {
   const SyntheticWorld home_{51};
   Parameters parameters_;
   std::unique_ptr<PlaceClouds> clouds_ = clouds_in_memory();
+  PlaceGeometries geometries_;
   std::map<FrameId, IntensityScanContext> descriptors_;
   TrajectoryPoints points_;
   LoopFollowing following_;

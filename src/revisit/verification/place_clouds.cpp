@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/verification/place_clouds.hpp>
 
+#include <algorithm>
 #include <map>
 #include <string>
 
@@ -24,6 +25,19 @@ class InMemory final : public PlaceClouds {
 };
 
 }  // namespace
+
+std::shared_ptr<const ScanGeometry> PlaceGeometries::find(FrameId place) {
+  const auto found =
+      std::find_if(by_use_.begin(), by_use_.end(), [&](const auto& each) { return each.first == place; });
+  if (found == by_use_.end()) return nullptr;
+  by_use_.splice(by_use_.begin(), by_use_, found);
+  return by_use_.front().second;
+}
+
+void PlaceGeometries::keep(FrameId place, std::shared_ptr<const ScanGeometry> geometry) {
+  if (by_use_.size() == kKept) by_use_.pop_back();
+  by_use_.emplace_front(place, std::move(geometry));
+}
 
 std::unique_ptr<PlaceClouds> clouds_in_memory() { return std::make_unique<InMemory>(); }
 
