@@ -8,6 +8,7 @@
 #include <revisit/io/bag_writer.hpp>
 #include <revisit/io/internal/bag_file_writer.hpp>
 #include <revisit/io/internal/message_writer.hpp>
+#include <revisit/io/internal/messages_for_test.hpp>
 #include <revisit/io/recording.hpp>
 
 #include "shared_data.hpp"
@@ -259,22 +260,6 @@ TEST(BagRecording, AMountingUpsideDownIsKnownFromTransforms) {
   EXPECT_NE(opened.log.find("tilted by 180 degrees"), std::string::npos) << opened.log;
 }
 
-// A Livox message as its driver serialises it: 19 bytes a point in ROS 1, 20 in CDR.
-std::string livox_message(io_internal::Serialisation how, int points) {
-  io_internal::MessageWriter message(how);
-  message.header(1'600'000'000'000'000'000, "livox_frame");
-  message.number(std::uint64_t{1'600'000'000'000'000'000});
-  message.number(static_cast<std::uint32_t>(points));
-  for (int i = 0; i < 4; ++i) message.number(std::uint8_t{0});  // lidar_id, rsvd
-  message.number(static_cast<std::uint32_t>(points));
-  for (int i = 0; i < points; ++i) {
-    message.number(static_cast<std::uint32_t>(i) * 1'000'000);
-    for (const float value : {1.f + static_cast<float>(i), 2.f, 3.f}) message.number(value);
-    for (const int value : {i % 256, 16, i % 6}) message.number(static_cast<std::uint8_t>(value));
-  }
-  return message.bytes();
-}
-
 TEST(BagRecording, LivoxMessagesOfBothRosAndBothDrivers) {
   for (const char* ending : kEndings)
     for (const char* type : {"livox_ros_driver/CustomMsg", "livox_ros_driver2/CustomMsg"})
@@ -285,7 +270,7 @@ TEST(BagRecording, LivoxMessagesOfBothRosAndBothDrivers) {
                                                     : io_internal::create_db3(file);
         ASSERT_TRUE(writer);
         ASSERT_TRUE((*writer)->add_topic("/livox/lidar", type));
-        const std::string message = livox_message((*writer)->serialisation(), points);
+        const std::string message = io_internal::livox_message((*writer)->serialisation(), points);
         ASSERT_TRUE((*writer)->write(0, 1'600'000'000'100'000'000, message));
         ASSERT_TRUE((*writer)->finish());
         const auto opened = open(file);

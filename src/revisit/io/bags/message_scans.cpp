@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <revisit/core/stamps.hpp>
@@ -9,54 +7,6 @@
 
 namespace revisit::io_internal {
 namespace {
-
-bool is_livox(const std::string& type) { return type.ends_with("/CustomMsg"); }
-
-PointCloudView view_of_cloud(const MessageValues& message) {
-  PointCloudView view;
-  const auto size = [&](const std::string& path) {
-    return static_cast<std::size_t>(std::max<std::int64_t>(0, message.integer(path).value_or(0)));
-  };
-  for (std::size_t i = 0; i < message.count("fields"); ++i) {
-    const std::string field = "fields[" + std::to_string(i) + "].";
-    view.fields.push_back({message.text(field + "name"), static_cast<std::uint32_t>(size(field + "offset")),
-                           static_cast<std::uint8_t>(size(field + "datatype"))});
-  }
-  view.width = size("width");
-  view.height = size("height");
-  view.point_step = size("point_step");
-  view.row_step = size("row_step");
-  view.is_big_endian = message.number("is_bigendian").value_or(0.0) != 0.0;
-  view.data = message.block("data");
-  return view;
-}
-
-// The points of a Livox message are records too, their fields those that its definition names.
-PointCloudView view_of_livox(const MessageValues& message) {
-  constexpr std::array<std::uint8_t, 10> kTypes{1, 2, 3, 4, 5, 6, 0, 0, 7, 8};  // of the primitives, in their order
-  PointCloudView view;
-  view.width = message.count("points");
-  view.is_big_endian = message.is_big_endian();
-  std::size_t begin = message.bytes().size(), end = 0;
-  for (const char* name : {"x", "y", "z", "reflectivity", "line", "offset_time"})
-    if (const auto* value = message.find("points." + std::string(name));
-        value != nullptr && size_of(value->primitive) > 0) {
-      begin = std::min(begin, value->offset);
-      end = std::max(end, value->offset + size_of(value->primitive));
-      view.point_step = value->stride;
-    }
-  if (begin >= end) return view;
-  if (view.width == 1) view.point_step = end - begin;
-  for (const char* name : {"x", "y", "z", "reflectivity", "line", "offset_time"})
-    if (const auto* value = message.find("points." + std::string(name));
-        value != nullptr && size_of(value->primitive) > 0)
-      view.fields.push_back({name, static_cast<std::uint32_t>(value->offset - begin),
-                             kTypes[static_cast<std::size_t>(value->primitive)]});
-  // The last record may end before its padding does.
-  view.row_step = view.width * view.point_step;
-  view.data = message.bytes().subspan(begin);
-  return view;
-}
 
 class MessageScans final : public ScanSource {
  public:
@@ -105,10 +55,7 @@ class MessageScans final : public ScanSource {
   Result<Scan> decode(const BagMessage& message, const LogSink& log, PointTimes& times) const {
     const auto values = bag_->decode(topic_, message);
     if (!values) return values.error();
-    const std::string& type = bag_->topics()[topic_].type;
-    if (type == "velodyne_msgs/VelodyneScan") return decode_velodyne(*values);
-    return to_scan(is_livox(type) ? view_of_livox(*values) : view_of_cloud(*values), stamp_of(*values, message), name(),
-                   log, &times);
+    return scan_of_message(bag_->topics()[topic_].type, *values, stamp_of(*values, message), echo_, name(), log, times);
   }
 
   // When it was recorded, where nobody set the stamp. Simulated clocks begin at 0.
@@ -116,29 +63,6 @@ class MessageScans final : public ScanSource {
     constexpr std::int64_t kClocksBegin_ns = 1'000'000'000;
     const std::int64_t stamp_ns = values.stamp_ns();
     return to_seconds(stamp_ns != 0 || message.log_time_ns < kClocksBegin_ns ? stamp_ns : message.log_time_ns);
-  }
-
-  Result<Scan> decode_velodyne(const MessageValues& values) const {
-    const auto* data = values.find("packets.data");
-    if (data == nullptr || data->primitive != Primitive::kUint8) return Error{name() + ": a message without packets"};
-    const auto payload = [&](std::size_t i) {
-      return values.bytes().subspan(data->offset + i * data->stride, data->count);
-    };
-    const auto decoder = velodyne_decoder(payload(0), data->messages > 1 ? payload(1) : ByteSpan(), echo_);
-    if (!decoder) return Error{name() + ": " + advice_for_packets(payload(0))};
-    PacketPoints points;
-    std::int64_t before = decoder->time_ns(payload(0), 0), wrapped = 0;
-    const std::int64_t offset = values.stamp_ns("packets.stamp") - before;
-    for (std::size_t i = 0; i < data->messages; ++i) {
-      if (!decoder->accepts(payload(i))) continue;
-      const std::size_t first = points.times_ns.size();
-      decoder->decode(payload(i), 0, decoder->parts(), points);
-      const std::int64_t now = decoder->time_ns(payload(i), 0);
-      if (now < before - decoder->clock_period_ns() / 2) wrapped += decoder->clock_period_ns();
-      before = now;
-      for (std::size_t j = first; j < points.times_ns.size(); ++j) points.times_ns[j] += wrapped;
-    }
-    return finish_scan(std::move(points), offset);
   }
 
   std::shared_ptr<const Bag> bag_;
@@ -193,10 +117,6 @@ std::vector<std::string> MessageScans::findings() const {
 }
 
 }  // namespace
-
-bool holds_scans(const std::string& type) {
-  return type == "sensor_msgs/PointCloud2" || type == "velodyne_msgs/VelodyneScan" || is_livox(type);
-}
 
 bool holds_packets(const std::string& type) {
   return type == "ouster_ros/PacketMsg" || type == "ouster_sensor_msgs/PacketMsg" || type == "pandar_msgs/PandarScan";

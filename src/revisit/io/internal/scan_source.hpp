@@ -30,6 +30,10 @@ class ScanSource {
 Result<std::unique_ptr<ScanSource>> scans_of_messages(std::shared_ptr<const Bag> bag, std::size_t topic, Echo echo,
                                                       const LogSink& log);
 bool holds_scans(const std::string& type);  ///< whether scans_of_messages() takes messages of this type
+/// The scan in one of them. `what` names it in messages; `times` are set where points of PointCloud2 and Livox have
+/// some.
+Result<Scan> scan_of_message(const std::string& type, const MessageValues& values, double stamp_s, Echo echo,
+                             const std::string& what, const LogSink& log, PointTimes& times);
 bool holds_packets(const std::string& type);
 
 /// Scans cut out of single packets, where a sensor's turn begins. All heads of packets are read.

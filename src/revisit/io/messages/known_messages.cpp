@@ -6,7 +6,8 @@
 namespace revisit::io_internal {
 namespace {
 
-// The fields of the messages that revisit reads, for bags that embed no definitions.
+// The fields of the messages that revisit reads, for bags that embed no definitions. Constants are not read, but belong
+// to what ROS 1 makes its checksums of.
 const std::map<std::string, std::string, std::less<>>& definitions() {
   const std::string cloud = R"(Header header
 uint32 height
@@ -18,6 +19,14 @@ uint32 row_step
 uint8[] data
 bool is_dense
 MSG: sensor_msgs/PointField
+uint8 INT8=1
+uint8 UINT8=2
+uint8 INT16=3
+uint8 UINT16=4
+uint8 INT32=5
+uint8 UINT32=6
+uint8 FLOAT32=7
+uint8 FLOAT64=8
 string name
 uint32 offset
 uint8 datatype
@@ -99,9 +108,13 @@ geometry_msgs/Transform transform
       {"tf2_msgs/TFMessage", "geometry_msgs/TransformStamped[] transforms\n" + geometry},
       {"tf/tfMessage", "geometry_msgs/TransformStamped[] transforms\n" + geometry},
       {"sensor_msgs/NavSatFix",
+       "uint8 COVARIANCE_TYPE_UNKNOWN=0\nuint8 COVARIANCE_TYPE_APPROXIMATED=1\n"
+       "uint8 COVARIANCE_TYPE_DIAGONAL_KNOWN=2\nuint8 COVARIANCE_TYPE_KNOWN=3\n"
        "Header header\nNavSatStatus status\nfloat64 latitude\nfloat64 longitude\nfloat64 altitude\n"
        "float64[9] position_covariance\nuint8 position_covariance_type\n"
-       "MSG: sensor_msgs/NavSatStatus\nint8 status\nuint16 service\n"},
+       "MSG: sensor_msgs/NavSatStatus\nint8 STATUS_NO_FIX=-1\nint8 STATUS_FIX=0\nint8 STATUS_SBAS_FIX=1\n"
+       "int8 STATUS_GBAS_FIX=2\nuint16 SERVICE_GPS=1\nuint16 SERVICE_GLONASS=2\nuint16 SERVICE_COMPASS=4\n"
+       "uint16 SERVICE_GALILEO=8\nint8 status\nuint16 service\n"},
   };
   return kDefinitions;
 }
