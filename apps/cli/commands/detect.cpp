@@ -13,6 +13,7 @@
 #include <revisit/pipeline/localiser.hpp>
 #include <revisit/pipeline/loop_detector.hpp>
 #include <revisit/pipeline/recording_scale.hpp>
+#include <revisit/store/stored_clouds.hpp>
 
 #include "common.hpp"
 #include "progress.hpp"
@@ -210,7 +211,7 @@ int detect(const DetectOptions& options) {
   if (const Status status = write_poses(out, **recording); !status) return fail(status.error());
 
   listen_for_interrupt();
-  LoopDetector detector(*parameters, *scale, *calibration, print_log());
+  LoopDetector detector(*parameters, *scale, *calibration, print_log(), clouds_in_file());
   if (database->recording)
     if (const Status status = add_database(detector, *database->recording, run); !status) return fail(status.error());
   if (database->map) run.counts["database_places"] = database->map->places();

@@ -14,11 +14,11 @@ constexpr double kGap_m = 0.5;  // what odometry may be off once it is back on i
 }  // namespace
 
 LoopDetector::LoopDetector(const Parameters& parameters, const std::optional<IntensityScale>& scale,
-                           IntensityCalibration calibration, LogSink log)
+                           IntensityCalibration calibration, LogSink log, std::unique_ptr<PlaceClouds> clouds)
     : parameters_(require_valid(parameters)),
       odometry_(Odometry::Source::kLidar, ScanMatcher::kCoarse),
       preparation_(parameters, scale, std::move(calibration), std::move(log)),
-      recognition_(parameters, clouds_in_memory()) {}
+      recognition_(parameters, std::move(clouds)) {}
 
 Result<Detection> LoopDetector::process(Scan scan, const std::optional<Pose>& T_world_lidar) {
   auto prepared = follow_and_prepare(std::move(scan));

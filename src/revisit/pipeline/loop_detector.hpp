@@ -16,9 +16,11 @@ namespace revisit {
 /// unit, swept or not. Frames increase. Belongs to one thread at a time.
 class LoopDetector {
  public:
-  /// Without a `scale`, the first ten scans decide it. Throws std::invalid_argument for parameters out of range.
+  /// Without a `scale`, the first ten scans decide it. `clouds` keeps what a place is registered by: in memory some 80
+  /// kB each, or in a file (clouds_in_file()). Throws std::invalid_argument for parameters out of range.
   explicit LoopDetector(const Parameters& parameters = {}, const std::optional<IntensityScale>& scale = std::nullopt,
-                        IntensityCalibration calibration = {}, LogSink log = {});
+                        IntensityCalibration calibration = {}, LogSink log = {},
+                        std::unique_ptr<PlaceClouds> clouds = clouds_in_memory());
 
   /// Looks for the scan's place among those old enough (exclusion of the recent past), then adds it.
   /// `T_world_lidar`, if there is one, is recorded as evidence and never used to decide.
@@ -30,6 +32,9 @@ class LoopDetector {
 
   /// Looks for the scan's place among all that were added, and adds nothing.
   Result<Detection> localise(Scan scan);
+
+  /// Takes over `temporal` and `geometric`, from the next scan on. Throws std::invalid_argument likewise.
+  void set_verification(const Parameters& parameters) { recognition_.set_verification(require_valid(parameters)); }
 
   const PlaceIndex& index() const { return recognition_.index(); }
 

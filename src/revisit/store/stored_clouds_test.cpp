@@ -43,6 +43,30 @@ TEST(StoredClouds, GivesEachPlaceItsOwnCloudHoweverFewStayInMemory) {
   }
 }
 
+void gives_back(PlaceClouds& clouds, const std::vector<ThinCloud>& put) {
+  for (std::size_t i = 0; i < put.size(); ++i) ASSERT_TRUE(clouds.put({static_cast<std::int64_t>(i)}, put[i]));
+  for (const std::size_t i : {0u, 1u, 2u, 3u, 4u, 0u, 4u, 2u, 2u, 1u}) {
+    const auto cloud = clouds.get({static_cast<std::int64_t>(i)});
+    ASSERT_TRUE(cloud) << cloud.error().message;
+    EXPECT_EQ((*cloud)->points, put[i].points) << "place " << i;
+    EXPECT_EQ(to_bytes(**cloud), to_bytes(put[i])) << "place " << i;
+  }
+  EXPECT_FALSE(clouds.get({77}));
+}
+
+TEST(StoredClouds, InAFileThatNobodySees) {
+  const Stored stored("file");
+  gives_back(*clouds_in_file(1), stored.clouds);
+}
+
+TEST(StoredClouds, WithoutAFileTheyStayInMemory) {
+  const Stored stored("no_file");
+  setenv("TMPDIR", "/nowhere", 1);
+  const auto clouds = clouds_in_file(1);
+  unsetenv("TMPDIR");
+  gives_back(*clouds, stored.clouds);
+}
+
 TEST(StoredClouds, ACloudGivenOutOutlivesItsPlaceInMemory) {
   const Stored stored("outlives");
   const auto clouds = clouds_in_store(stored.store, 1);
