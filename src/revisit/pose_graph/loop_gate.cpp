@@ -18,6 +18,9 @@ struct Consistency {
   // and aisles are shorter, or show their ends.
   static constexpr std::size_t kFewestToJoin = 6;
   static constexpr double kLengthToJoin_m = 20.0;
+  // Likewise where tracking was lost, and the loops say that the robot was still there when it went on.
+  static constexpr std::size_t kFewestToGoOn = 3;
+  static constexpr double kLengthToGoOn_m = 5.0, kStillThere_m = 5.0;
 };
 
 }  // namespace
@@ -67,8 +70,28 @@ bool LoopGate::joins_sessions(const LoopConstraint& loop) const {
   return session_of(loop.match) != session_of(loop.query) && part(loop.match) != part(loop.query);
 }
 
+// Between the last key frame before tracking was lost and the first one after it, by this loop and one that entered
+// before.
+bool LoopGate::goes_on_where_it_was(const LoopConstraint& loop) const {
+  const TrajectoryPoint& query = at(loop.query);
+  const auto first = std::find_if(keyframes_.begin(), keyframes_.end(),
+                                  [&](const Keyframe& each) { return each.point.segment == query.segment; });
+  if (first == keyframes_.begin() || session_of((first - 1)->frame) != session_of(first->frame)) return false;
+  const TrajectoryPoint& last = (first - 1)->point;
+  return std::any_of(entered_.begin(), entered_.end(), [&](const LoopConstraint& other) {
+    const auto queries_m = travelled_between_m(at(other.query), last);
+    const auto matches_m = travelled_between_m(at(other.match), at(loop.match));
+    if (!queries_m || !matches_m || *queries_m + *matches_m > 2.0 * Consistency::kNear_m) return false;
+    const Pose T_last_first = T_between(last, at(other.query)) * other.T_match_query.inverse() *
+                              T_between(at(other.match), at(loop.match)) * loop.T_match_query *
+                              T_between(query, first->point);
+    return T_last_first.translation().norm() <= Consistency::kStillThere_m;
+  });
+}
+
 bool LoopGate::may_join(const LoopConstraint& loop, const std::vector<const LoopConstraint*>& agreeing) const {
-  if (agreeing.size() + 1 < Consistency::kFewestToJoin) return false;
+  const bool goes_on = goes_on_where_it_was(loop);
+  if (agreeing.size() + 1 < (goes_on ? Consistency::kFewestToGoOn : Consistency::kFewestToJoin)) return false;
   double queries_m = 0.0, matches_m = 0.0;
   for (const LoopConstraint* a : agreeing)
     for (const LoopConstraint* b : agreeing) {
@@ -82,7 +105,8 @@ bool LoopGate::may_join(const LoopConstraint& loop, const std::vector<const Loop
   const bool is_contradicted =
       contradicts(loop) ||
       std::any_of(agreeing.begin(), agreeing.end(), [&](const LoopConstraint* each) { return contradicts(*each); });
-  return !is_contradicted && std::min(queries_m, matches_m) >= Consistency::kLengthToJoin_m;
+  return !is_contradicted &&
+         std::min(queries_m, matches_m) >= (goes_on ? Consistency::kLengthToGoOn_m : Consistency::kLengthToJoin_m);
 }
 
 LoopGate::Decision LoopGate::decide_alone(const LoopConstraint& loop) const {

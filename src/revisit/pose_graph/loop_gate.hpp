@@ -13,7 +13,8 @@ namespace revisit {
 /// Pairwise consistency (Mangelson et al., ICRA 2018): two loops close a circle with the odometry between their ends.
 /// An accepted loop enters the graph once another one near it agrees; one that stays alone must be very sure, and no
 /// loop that entered may contradict it. Between sessions that nothing joins yet, more of them must agree, over more of
-/// the trajectory: a wrong join is the worst error there is. Belongs to one thread at a time.
+/// the trajectory: a wrong join is the worst error there is. Where tracking was lost within a session that is joined,
+/// fewer suffice if they say that it went on where it was. Belongs to one thread at a time.
 class LoopGate {
  public:
   /// A key frame as odometry alone places it. Frames increase; otherwise std::invalid_argument.
@@ -47,6 +48,7 @@ class LoopGate {
   Verdict compare(const LoopConstraint& a, const LoopConstraint& b) const;
   bool is_overdue(const LoopConstraint& loop) const;
   bool joins_sessions(const LoopConstraint& loop) const;
+  bool goes_on_where_it_was(const LoopConstraint& loop) const;
   bool may_join(const LoopConstraint& loop, const std::vector<const LoopConstraint*>& agreeing) const;
   int root(int segment) const;
   Decision decide_alone(const LoopConstraint& loop) const;

@@ -74,6 +74,47 @@ TEST(LoopGate, NothingIsComparedAcrossALossOfTrack) {
   EXPECT_EQ(gate.offer(loop(1014, 14, 0.1)).size(), 2u);
 }
 
+// A second session along the same way is joined; after 50 m it loses track, and goes on `gap_m` later.
+LoopGate gate_that_lost_track(double gap_m) {
+  LoopGate gate;
+  TrajectoryPoint point;
+  for (int i = 0; i < 100; ++i) {
+    point = i == 0 ? point : point.after(planar_pose(1, 0, 0));
+    gate.add_keyframe({i}, point);
+  }
+  for (int i = 0; i < 80; ++i) {
+    if (i == 0 || i == 50)
+      point = TrajectoryPoint{.segment = point.segment + 1, .origin = point.segment + 1};
+    else
+      point = point.after(planar_pose(1, 0, 0));
+    gate.add_keyframe(in_map(1, {i}), point);
+  }
+  for (int i = 0; i < 40; i += 4) {
+    LoopConstraint joins = loop(0, i, 0.0);
+    joins.query = in_map(1, {i});
+    for (const auto& decision : gate.offer(joins)) gate.join(decision.loop);
+  }
+  for (int i = 50; i < 80; ++i) {
+    LoopConstraint after = loop(0, i + static_cast<int>(gap_m), 0.0);
+    after.query = in_map(1, {i});
+    if (i % 3 == 0 && i < 63)
+      for (const auto& decision : gate.offer(after)) gate.join(decision.loop);
+  }
+  return gate;
+}
+
+TEST(LoopGate, ASessionGoesOnWhereItLostTrack) {
+  const LoopGate gate = gate_that_lost_track(2.0);
+  ASSERT_EQ(gate.part(in_map(1, {10})), 0);
+  EXPECT_EQ(gate.part(in_map(1, {60})), 0) << "four loops over nine metres";
+}
+
+TEST(LoopGate, ElsewhereFewLoopsDoNotJoinWhatLostTrack) {
+  const LoopGate gate = gate_that_lost_track(15.0);
+  ASSERT_EQ(gate.part(in_map(1, {10})), 0);
+  EXPECT_NE(gate.part(in_map(1, {60})), 0) << "15 m on, in no time";
+}
+
 TEST(LoopGate, KnowsItsKeyframes) {
   LoopGate gate = gate_of_two_visits();
   EXPECT_TRUE(gate.offer(loop(1010, 10, 0.2)).empty());
