@@ -12,7 +12,7 @@
 #include <revisit/localisation/saved_map.hpp>
 #include <revisit/mapping/build_map.hpp>
 #include <revisit/mapping/earth_frame.hpp>
-#include <revisit/mapping/occupancy_grid.hpp>
+#include <revisit/pipeline/map_grid.hpp>
 #include <revisit/store/keyframe_bytes.hpp>
 
 #include "common.hpp"
@@ -124,24 +124,13 @@ Status export_points(const SavedMap& map, const Part& part, const ExportOptions&
 }
 
 Status export_grid(const SavedMap& map, const Part& part, const ExportOptions& options) {
-  OccupancyGrid grid(options.grid);
   Progress progress("export", "key frames", part.frames.size());
-  for (std::size_t i = 0; i < part.frames.size(); ++i) {
-    if (interrupted()) return Error{"interrupted; nothing was written"};
-    const auto points = read_map_points(*map.store(), part.frames[i], options.after_session);
-    if (!points) return points.error();
-    const auto bytes = map.store()->part(part.frames[i], MapStore::Part::kPlace);
-    if (!bytes) return bytes.error();
-    progress.update(i + 1);
-    if (points->empty() || bytes->empty()) continue;
-    const auto place = to_thin_cloud(*bytes);
-    if (!place) return map.store()->damaged("place", part.frames[i]);
-    std::vector<Eigen::Vector3f> ground;
-    for (std::size_t k = 0; k < place->points.size(); ++k)
-      if (place->is_ground[k] != 0) ground.push_back(place->points[k]);
-    grid.add(part.poses[i], *points, ground);
-  }
-  return grid.write(fs::path(options.out) / "grid.yaml");
+  const auto grid =
+      grid_of_map(*map.store(), part.frames, part.poses, options.grid, options.after_session, [&](std::size_t done) {
+        progress.update(done);
+        return !interrupted();
+      });
+  return grid ? grid->write(fs::path(options.out) / "grid.yaml") : Status(grid.error());
 }
 
 // A file a session: every scan of it, in the coordinates of the map.

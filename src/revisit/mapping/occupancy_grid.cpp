@@ -110,8 +110,8 @@ OccupancyGrid::Cell OccupancyGrid::at(double x_m, double y_m) const {
   return found == cells_.end() ? Cell::kUnknown : verdict(found->second);
 }
 
-Status OccupancyGrid::write(const std::filesystem::path& yaml_file) const {
-  if (cells_.empty()) return Error{yaml_file.string() + ": the map shows no ground to drive on"};
+Result<OccupancyGrid::Image> OccupancyGrid::image() const {
+  if (cells_.empty()) return Error{"the map shows no ground to drive on"};
   int low_x = std::numeric_limits<int>::max(), low_y = low_x, high_x = std::numeric_limits<int>::min(), high_y = high_x;
   for (const auto& [cell, seen] : cells_) {
     low_x = std::min(low_x, cell.x);
@@ -119,30 +119,40 @@ Status OccupancyGrid::write(const std::filesystem::path& yaml_file) const {
     low_y = std::min(low_y, cell.y);
     high_y = std::max(high_y, cell.y);
   }
-  const auto width = static_cast<std::size_t>(std::int64_t{high_x} - low_x + 1),
-             height = static_cast<std::size_t>(std::int64_t{high_y} - low_y + 1);
+  Image image;
+  image.width = static_cast<std::size_t>(std::int64_t{high_x} - low_x + 1);
+  image.height = static_cast<std::size_t>(std::int64_t{high_y} - low_y + 1);
   constexpr std::size_t kMostCells = 2'000'000'000;
-  if (width > kMostCells / height)
-    return Error{yaml_file.string() + ": " + std::to_string(width) + " x " + std::to_string(height) +
-                 " cells; allowed: up to " + std::to_string(kMostCells) + " (larger cells need fewer)"};
-  constexpr char kFree = '\xfe', kOccupied = '\0', kUnknown = '\xcd';
-  std::vector<char> image(width * height, kUnknown);  // rows from the top, where y is largest
-  for (const auto& [cell, seen] : cells_) {
-    const Cell is = verdict(seen);
-    image[static_cast<std::size_t>(high_y - cell.y) * width + static_cast<std::size_t>(cell.x - low_x)] =
-        is == Cell::kOccupied ? kOccupied
-        : is == Cell::kFree   ? kFree
-                              : kUnknown;
-  }
+  if (image.width > kMostCells / image.height)
+    return Error{std::to_string(image.width) + " x " + std::to_string(image.height) + " cells; allowed: up to " +
+                 std::to_string(kMostCells) + " (larger cells need fewer)"};
+  image.x_m = low_x * options_.cell_m;
+  image.y_m = low_y * options_.cell_m;
+  image.cells.resize(image.width * image.height);
+  for (const auto& [cell, seen] : cells_)
+    image.cells[static_cast<std::size_t>(cell.y - low_y) * image.width + static_cast<std::size_t>(cell.x - low_x)] =
+        verdict(seen);
+  return image;
+}
+
+Status OccupancyGrid::write(const std::filesystem::path& yaml_file) const {
+  const auto image = this->image();
+  if (!image) return Error{yaml_file.string() + ": " + image.error().message};
   std::filesystem::path pgm_file = yaml_file;
   pgm_file.replace_extension(".pgm");
   std::ofstream pgm(pgm_file, std::ios::binary | std::ios::trunc);
-  pgm << "P5\n# revisit: occupancy\n" << width << ' ' << height << "\n255\n";
-  pgm.write(image.data(), static_cast<std::streamsize>(image.size()));
+  pgm << "P5\n# revisit: occupancy\n" << image->width << ' ' << image->height << "\n255\n";
+  const auto grey = [](Cell cell) { return cell == Cell::kOccupied ? '\0' : cell == Cell::kFree ? '\xfe' : '\xcd'; };
+  std::string line(image->width, '\0');
+  for (std::size_t row = image->height; row-- > 0;) {  // from the top, where y is largest
+    const auto first = image->cells.begin() + static_cast<std::ptrdiff_t>(row * image->width);
+    std::transform(first, first + static_cast<std::ptrdiff_t>(image->width), line.begin(), grey);
+    pgm << line;
+  }
   pgm.close();
   std::ofstream yaml(yaml_file, std::ios::trunc);
   yaml << "image: " << pgm_file.filename().string() << "\nmode: trinary\nresolution: " << options_.cell_m
-       << "\norigin: [" << low_x * options_.cell_m << ", " << low_y * options_.cell_m
+       << "\norigin: [" << image->x_m << ", " << image->y_m
        << ", 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n";
   yaml.close();
   if (!pgm) return Error{pgm_file.string() + ": cannot be written"};

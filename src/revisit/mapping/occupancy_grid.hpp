@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <span>
 #include <unordered_map>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -33,6 +34,14 @@ class OccupancyGrid {
   enum class Cell : std::uint8_t { kUnknown, kFree, kOccupied };
   /// At a place of the map.
   Cell at(double x_m, double y_m) const;
+  struct Image {
+    std::size_t width = 0, height = 0;
+    double x_m = 0.0, y_m = 0.0;  ///< of the lower left corner
+    std::vector<Cell> cells;      ///< row by row, from the lowest y
+  };
+  /// An error where nothing was added, or where it would be too large.
+  Result<Image> image() const;
+  double cell_m() const { return options_.cell_m; }
   /// NAME.pgm and NAME.yaml (`image`, `resolution`, `origin` of the lower left corner, ...). An error where nothing was
   /// added, or where a file cannot be written.
   Status write(const std::filesystem::path& yaml_file) const;
