@@ -142,7 +142,6 @@ Status run_all(Slam& slam, const Recording& recording, const OtherOdometry& odom
     while (first < recording.size() && recording.frame(first) <= *last) ++first;
     print_log()(LogLevel::kInfo, "going on after frame " + std::to_string(last->value) + ": " +
                                      std::to_string(slam.graph().keyframes().size()) + " key frames are there");
-    if (const auto T_odom_lidar = first > 0 ? odometry(first - 1) : std::nullopt) slam.restore_external(*T_odom_lidar);
   }
   Progress progress("slam", "scans", recording.size() - first);
   ReadAhead scans(recording, first);

@@ -299,6 +299,12 @@ Status Localiser::look_nearby(const PreparedScan& scan, Detection& detection) {
   return ok();
 }
 
+void Localiser::set_verification(const Parameters& parameters) {
+  recognition_.set_verification(require_valid(parameters));
+  parameters_.temporal = parameters.temporal;
+  parameters_.geometric = parameters.geometric;
+}
+
 void Localiser::expect(const Pose& T_map_lidar) {
   const StoredMapPose* nearest = nullptr;
   const auto distance_m = [&](const StoredMapPose& each) {

@@ -55,6 +55,10 @@ class Localiser {
   /// there as well as everywhere. Height and tilt are the map's. Of a map in several parts, the first.
   void expect(const Pose& T_map_lidar);
 
+  /// Takes over `temporal` and `geometric`, from the next scan on. Throws std::invalid_argument for parameters out of
+  /// range.
+  void set_verification(const Parameters& parameters);
+
   std::size_t places() const { return recognition_.index().size(); }
   const SavedPlaces& map() const { return map_; }
 

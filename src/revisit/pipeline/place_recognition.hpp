@@ -47,6 +47,12 @@ class PlaceRecognition {
   /// Where a place is, known better by now.
   void set_point(FrameId place, const TrajectoryPoint& point) { points_.insert_or_assign(points_.end(), place, point); }
 
+  /// Takes over `temporal` and `geometric`, from the next scan on.
+  void set_verification(const Parameters& parameters) {
+    parameters_.temporal = parameters.temporal;
+    parameters_.geometric = parameters.geometric;
+  }
+
   const PlaceIndex& index() const { return index_; }
   /// How much alike the places are (LookAlikes): as this run learnt, or as the map says.
   double look_alikes_log_odds() const { return look_alikes_of_map_ ? *look_alikes_of_map_ : look_alikes_.log_odds(); }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/pipeline/slam.hpp>
 
+#include <sstream>
 #include <utility>
 
 #include <revisit/core/stopwatch.hpp>
@@ -15,6 +16,8 @@ Result<std::shared_ptr<MapStore>> shared(Result<MapStore> store) {
   if (!store) return store.error();
   return std::make_shared<MapStore>(*std::move(store));
 }
+
+constexpr const char* kExternalNote = "external_odometry";
 
 }  // namespace
 
@@ -75,7 +78,35 @@ Status Slam::restore(const SlamSetup& setup) {
   const auto last = store_->last_scans(1);
   if (!last) return last.error();
   if (!last->empty()) last_frame_ = in_recording(last->back().frame);
-  return front_end_.restore(*store_, *map);
+  if (Status restored = front_end_.restore(*store_, *map); !restored) return restored;
+  return restore_external();
+}
+
+// Wheels go on counting while nobody listens: a run that goes on knows by them how far the robot went meanwhile.
+Status Slam::note_external() {
+  if (!T_external_last_) return ok();
+  const Eigen::Vector3d& p = T_external_last_->translation();
+  const Eigen::Quaterniond q(T_external_last_->linear());
+  return store_->set_note(kExternalNote, format("%lld %.17g %.17g %.17g %.17g %.17g %.17g %.17g",
+                                                static_cast<long long>(in_map(session_, *last_frame_).value), p.x(),
+                                                p.y(), p.z(), q.x(), q.y(), q.z(), q.w()));
+}
+
+Status Slam::restore_external() {
+  const auto note = store_->note(kExternalNote);
+  if (!note) return note.error();
+  if (!*note || !last_frame_) return ok();
+  std::istringstream text(**note);
+  long long frame = 0;
+  Eigen::Vector3d p;
+  Eigen::Quaterniond q;
+  text >> frame >> p.x() >> p.y() >> p.z() >> q.x() >> q.y() >> q.z() >> q.w();
+  if (!text || FrameId{frame} != in_map(session_, *last_frame_)) return ok();
+  Pose T = Pose::Identity();
+  T.translation() = p;
+  T.linear() = q.normalized().toRotationMatrix();
+  if (T.matrix().allFinite()) front_end_.restore_external(T);
+  return ok();
 }
 
 bool Slam::has_keyframes() const {
@@ -125,6 +156,8 @@ Result<SlamStep> Slam::process(Scan scan, const std::optional<Pose>& T_external_
   step.T_world_lidar = graph().T_world_lidar(keyframe) * T_keyframe_lidar;
   failure_ = store_->add(StoredScan{in_map(session_, step.frame), keyframe, odometry.stamp_s, T_keyframe_lidar,
                                     odometry.T_odom_lidar, step.is_tracked});
+  T_external_last_ = T_external_lidar;
+  if (failure_ && step.is_keyframe) failure_ = note_external();
   if (failure_ && step.is_keyframe) failure_ = store_->commit();
   if (!failure_) return failure_.error();
   step.ms.store += watch.lap_ms();
@@ -139,7 +172,10 @@ Status Slam::add(const GpsFix& fix) {
 
 Status Slam::finish() {
   if (!failure_) return failure_;
-  return has_keyframes() ? back_end_.finish() : store_->roll_back();  // an empty session is none
+  if (!has_keyframes()) return store_->roll_back();  // an empty session is none
+  const Status noted = note_external();
+  const Status finished = back_end_.finish();
+  return finished ? noted : finished;
 }
 
 Result<Slam::Trajectories> Slam::trajectories() const {

@@ -61,8 +61,9 @@ class Slam {
   Status add(const GpsFix& fix);
   /// Decides about loops that wait for others, and settles the graph. More scans may follow.
   Status finish();
-  /// The pose of the external odometry at the last scan of the map that this run continues.
-  void restore_external(const Pose& T_external_lidar) { front_end_.restore_external(T_external_lidar); }
+  /// Takes over `temporal` and `geometric`, from the next scan on. Throws std::invalid_argument for parameters out of
+  /// range.
+  void set_verification(const Parameters& parameters) { back_end_.set_verification(require_valid(parameters)); }
   bool has_failed() const { return !failure_; }  ///< the store has
 
   /// The last one of this session, as its recording numbers it.
@@ -91,6 +92,8 @@ class Slam {
  private:
   Slam(const Parameters& parameters, const SlamSetup& setup, Result<std::shared_ptr<MapStore>> store);
   Status restore(const SlamSetup& setup);
+  Status note_external();
+  Status restore_external();
   MapInput map_input() const;
 
   Parameters parameters_;
@@ -99,6 +102,7 @@ class Slam {
   SlamFrontEnd front_end_;
   SlamBackEnd back_end_;
   std::optional<FrameId> last_frame_;
+  std::optional<Pose> T_external_last_;  ///< what the other odometry said at that scan
   int session_ = 0;
 };
 

@@ -55,6 +55,8 @@ class SlamBackEnd {
   /// Parts are counted by their segments: once some have gone, what the map says of its parts is written anew.
   Status renumber_parts(const StoredMap& map);
 
+  void set_verification(const Parameters& parameters) { recognition_.set_verification(parameters); }
+
   const KeyframeGraph& graph() const { return graph_; }
   std::size_t places() const { return recognition_.index().size(); }
 

@@ -189,6 +189,25 @@ TEST(Slam, GoesOnWhereAKillLeftIt) {
   EXPECT_EQ(drive.slam->trajectories()->corrected.entries.size(), std::size_t{kScans});
 }
 
+// Killed on its way out, and on its way back when it is started again: wheels say how far it went.
+TEST(Slam, WheelsBridgeTheTimeWithoutIt) {
+  const auto wheels = [](int i) { return Pose(SyntheticWorld::at(7.0, 3.0, 0.4) * pose_of(i)); };
+  constexpr int kKilled = 40, kBack = kOut + kTurn + 30;
+  for (const bool has_wheels : {true, false}) {
+    {
+      Drive before(has_wheels ? "wheels" : "no_wheels");
+      for (int i = 0; i < kKilled; ++i)
+        ASSERT_TRUE(before.slam->process(scan_at(i), has_wheels ? std::optional(wheels(i)) : std::nullopt));
+    }
+    Drive after(has_wheels ? "wheels" : "no_wheels", false);
+    ASSERT_TRUE(after.slam) << after.log;
+    const auto step = after.slam->process(scan_at(kBack), has_wheels ? std::optional(wheels(kBack)) : std::nullopt);
+    ASSERT_TRUE(step) << step.error().message;
+    const Pose error = step->T_world_lidar.inverse() * pose_of(0).inverse() * pose_of(kBack);
+    EXPECT_EQ(to_degrees(rotation_angle(error)) < 2.0, has_wheels) << to_degrees(rotation_angle(error));
+  }
+}
+
 TEST(Slam, KeepsWhereAnAccelerometerFeelsUp) {
   Drive drive("gravity");
   const Eigen::Vector3f up = Eigen::Vector3f(0.1f, -0.05f, 1.f).normalized();  // it is mounted so
