@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/pipeline/loop_detector.hpp>
+#include <revisit/store/stored_clouds.hpp>
 
 #include "mode.hpp"
 
@@ -9,7 +10,7 @@ namespace {
 class DetectMode final : public Mode {
  public:
   DetectMode(const Parameters& parameters, Outlet& outlet, const LogSink& log)
-      : outlet_(outlet), detector_(parameters, std::nullopt, {}, log) {}
+      : outlet_(outlet), detector_(parameters, std::nullopt, {}, log, clouds_in_file()) {}
 
   Status process(Scan scan, const Moment& moment) override {
     stamps_ns_[scan.frame] = moment.stamp_ns;
@@ -20,6 +21,7 @@ class DetectMode final : public Mode {
     outlet_.send(message_of(*detection->loop, moment, stamps_ns_.at(detection->loop->match)));
     return ok();
   }
+  void set_verification(const Parameters& parameters) override { detector_.set_verification(parameters); }
   std::string state() const override {
     return std::to_string(detector_.index().size()) + " places, " + std::to_string(loops_) + " loops";
   }

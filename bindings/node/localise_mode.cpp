@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <utility>
+#include <vector>
 
 #include <revisit/mapping/build_map.hpp>
 #include <revisit/pipeline/localiser.hpp>
+#include <revisit/pipeline/map_grid.hpp>
 #include <revisit/store/keyframe_bytes.hpp>
 
 #include "mode.hpp"
@@ -42,23 +44,39 @@ class LocaliseMode final : public Mode {
   }
   // The points as they are now, of the part in which it is placed.
   Result<std::string> publish() override {
-    std::vector<FrameId> frames;
-    std::vector<Pose> poses;
-    for (const StoredMapPose& each : localiser_.map().poses()) {
-      if (each.part != 0) continue;
-      frames.push_back(each.keyframe);
-      poses.push_back(each.T_map_lidar);
-    }
+    const Placed placed = keyframes();
     const MapStore& store = *localiser_.map().store();
-    const auto points = collect_map({poses, [&](std::size_t i) { return read_map_points(store, frames[i]); }},
-                                    {.voxel_m = parameters_.slam.map_voxel_m});
+    const auto points =
+        collect_map({placed.poses, [&](std::size_t i) { return read_map_points(store, placed.frames[i]); }},
+                    {.voxel_m = parameters_.slam.map_voxel_m});
     if (!points) return points.error();
     outlet_.send(to_map_cloud(settings_, *points));
     return std::to_string(points->size()) + " points";
   }
+  Result<MapGrid> grid() override {
+    const Placed placed = keyframes();
+    return to_map_grid(settings_, grid_of_map(*localiser_.map().store(), placed.frames, placed.poses, {}));
+  }
+  void set_verification(const Parameters& parameters) override {
+    parameters_ = parameters;
+    localiser_.set_verification(parameters);
+  }
   std::string state() const override { return state_; }
 
  private:
+  struct Placed {
+    std::vector<FrameId> frames;
+    std::vector<Pose> poses;
+  };
+  Placed keyframes() const {
+    Placed placed;
+    for (const StoredMapPose& each : localiser_.map().poses()) {
+      if (each.part != 0) continue;
+      placed.frames.push_back(each.keyframe);
+      placed.poses.push_back(each.T_map_lidar);
+    }
+    return placed;
+  }
   static constexpr const char* kNothingYet = "no scan yet";
   Settings settings_;
   Parameters parameters_;

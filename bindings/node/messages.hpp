@@ -27,7 +27,8 @@ inline Transform3 to_transform(const Eigen::Vector3d& position, const Eigen::Qua
   return T;
 }
 
-/// sensor_msgs/PointCloud2.
+/// sensor_msgs/PointCloud2; or any message with a scan as it went over the wire, where `type` names it: then `data` is
+/// the whole message and the rest is in it.
 struct Cloud {
   struct Field {
     std::string name;
@@ -42,6 +43,8 @@ struct Cloud {
   const std::uint8_t* data = nullptr;
   std::size_t size = 0;
   std::shared_ptr<const void> owner;  ///< of the data
+  std::string type, definition;       ///< as ScanMessageReader takes them
+  bool is_ros1 = false;               ///< how the message was written; otherwise as CDR
 };
 
 /// sensor_msgs/Imu.
@@ -107,6 +110,14 @@ struct Graph {
 struct MapCloud {
   std::string map_frame;
   std::vector<float> points;
+};
+
+/// nav_msgs/OccupancyGrid: what may be driven over.
+struct MapGrid {
+  std::string map_frame;
+  double cell_m = 0.0, x_m = 0.0, y_m = 0.0;  ///< of the lower left corner
+  std::uint32_t width = 0, height = 0;
+  std::vector<std::int8_t> cells;  ///< row by row, from the lowest y: 0 free, 100 occupied, -1 unknown
 };
 
 /// diagnostic_msgs/DiagnosticStatus.

@@ -40,6 +40,25 @@ Eigen::Matrix<double, 6, 6> covariance_of(const Matrix6& information) {
   return 0.5 * (covariance + covariance.transpose());
 }
 
+Result<MapGrid> to_map_grid(const Settings& settings, const Result<OccupancyGrid>& grid) {
+  if (!grid) return grid.error();
+  const auto image = grid->image();
+  if (!image) return image.error();
+  MapGrid message{settings.map_frame,
+                  grid->cell_m(),
+                  image->x_m,
+                  image->y_m,
+                  static_cast<std::uint32_t>(image->width),
+                  static_cast<std::uint32_t>(image->height),
+                  {}};
+  message.cells.reserve(image->cells.size());
+  for (const OccupancyGrid::Cell cell : image->cells)
+    message.cells.push_back(cell == OccupancyGrid::Cell::kFree       ? std::int8_t{0}
+                            : cell == OccupancyGrid::Cell::kOccupied ? std::int8_t{100}
+                                                                     : std::int8_t{-1});
+  return message;
+}
+
 MapCloud to_map_cloud(const Settings& settings, const std::vector<Point>& points) {
   MapCloud cloud{settings.map_frame, {}};
   cloud.points.reserve(4 * points.size());

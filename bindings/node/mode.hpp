@@ -14,6 +14,7 @@
 #include <revisit/core/pose.hpp>
 #include <revisit/core/result.hpp>
 #include <revisit/core/scan.hpp>
+#include <revisit/mapping/occupancy_grid.hpp>
 
 #include "node.hpp"
 
@@ -42,6 +43,9 @@ class Mode {
   virtual Result<std::string> save(const std::string&) { return Error{"this mode has no map to save"}; }
   virtual Result<std::string> load(const std::string&) { return Error{"only localise loads maps"}; }
   virtual Result<std::string> publish() { return Error{"this mode has no map to publish"}; }
+  virtual Result<MapGrid> grid() { return Error{"this mode has no map"}; }
+  /// Takes over what may change while it runs: the parameters `temporal` and `geometric`.
+  virtual void set_verification(const Parameters& parameters) = 0;
   virtual Status finish() { return ok(); }
   virtual std::string state() const = 0;  ///< in a few words, for diagnostics
 };
@@ -54,6 +58,7 @@ Result<std::unique_ptr<Mode>> make_localise_mode(const Settings& settings, const
 
 Loop message_of(const LoopConstraint& loop, const Moment& moment, std::int64_t match_stamp_ns);
 MapCloud to_map_cloud(const Settings& settings, const std::vector<Point>& points);
+Result<MapGrid> to_map_grid(const Settings& settings, const Result<OccupancyGrid>& grid);
 /// map -> odom where there is odometry, else map -> base: what tf needs to know of a pose in the map. Nothing where
 /// that would give a frame a second parent.
 std::optional<Frame> map_frame_of(const Settings& settings, const Moment& moment, const Pose& T_map_lidar);

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <chrono>
 #include <exception>
+#include <iterator>
 #include <mutex>
+#include <set>
 #include <thread>
 #include <utility>
 
@@ -17,12 +19,35 @@
 namespace revisit::node {
 namespace {
 
+Result<Parameters> parameters_of(const Settings& settings) {
+  Parameters values;
+  for (const auto& [name, value] : settings.parameters)
+    if (const Status set = set_parameter(values, name, value); !set) return set.error();
+  if (const Status valid = validate(values); !valid) return valid.error();
+  return values;
+}
+
+// The names of what differs. An error where something does that must stay while a node runs.
+Result<std::string> changes_of(const Settings& before, const Settings& after) {
+  std::set<std::pair<std::string, std::string>> was(before.parameters.begin(), before.parameters.end()),
+      is(after.parameters.begin(), after.parameters.end()), differs;
+  std::set_symmetric_difference(was.begin(), was.end(), is.begin(), is.end(), std::inserter(differs, differs.end()));
+  std::string changes;
+  for (const auto& [name, value] : differs) {
+    if (!name.starts_with("geometric.") && !name.starts_with("temporal."))
+      return Error{name + ": cannot change while the node runs; geometric.* and temporal.* can"};
+    if (!changes.ends_with(" " + name)) changes += " " + name;
+  }
+  return changes;
+}
+
 class ThreadedNode final : public Node {
  public:
   ThreadedNode(const Settings& settings, Outlet& outlet, std::unique_ptr<Mode> mode)
-      : map_frame_(settings.map_frame),
+      : settings_(settings),
         outlet_(outlet),
         inbox_(settings.queue),
+        clouds_(log_to(outlet)),
         moments_(settings, inbox_, outlet),
         mode_(std::move(mode)),
         worker_([this] { work(); }) {}
@@ -47,6 +72,25 @@ class ThreadedNode final : public Node {
   }
   bool publish_map(std::string& message) override {
     return tell(message, [&] { return mode_->publish(); });
+  }
+  bool change(const Settings& settings, std::string& message) override {
+    return tell(message, [&]() -> Result<std::string> {
+      const auto changes = changes_of(settings_, settings);
+      if (!changes) return changes.error();
+      const auto parameters = parameters_of(settings);
+      if (!parameters) return parameters.error();
+      mode_->set_verification(*parameters);
+      settings_ = settings;
+      return changes->empty() ? "nothing has changed" : "changed:" + *changes;
+    });
+  }
+  bool get_map(MapGrid& grid, std::string& message) override {
+    return tell(message, [&]() -> Result<std::string> {
+      auto made = mode_->grid();
+      if (!made) return made.error();
+      grid = *std::move(made);
+      return std::to_string(grid.width) + " x " + std::to_string(grid.height) + " cells";
+    });
   }
   bool finish(std::string& message) override {
     inbox_.close();
@@ -109,24 +153,25 @@ class ThreadedNode final : public Node {
 
   Status work_on(const Cloud& cloud) {
     const std::int64_t number = scans_++;
-    auto scan = to_scan(cloud, number, log_to(outlet_));
-    if (!scan) return scan.error();
-    const Moment moment = moments_.of(cloud, *scan);
+    auto message = clouds_.read(cloud, number);
+    if (!message) return message.error();
+    const Moment moment = moments_.of(*message);
     const std::lock_guard lock(mode_mutex_);
     const auto done = caught<bool>([&]() -> Result<bool> {
       for (const GpsFix& fix : inbox_.take_fixes())
         if (const Status added = mode_->add(to_gps_fix(fix)); !added) return added.error();
       if (const auto initial = inbox_.take_initial_pose())
         if (const Status taken = expect(*initial, moment); !taken) outlet_.log(true, taken.error().message);
-      if (const Status processed = mode_->process(*std::move(scan), moment); !processed) return processed.error();
+      if (const Status processed = mode_->process(std::move(message->scan), moment); !processed)
+        return processed.error();
       return true;
     });
     return done ? ok() : Status(done.error());
   }
 
   Status expect(const InitialPose& initial, const Moment& moment) {
-    if (!initial.frame_id.empty() && initial.frame_id != map_frame_)
-      return Error{"initial pose in the frame " + initial.frame_id + "; it must be in " + map_frame_};
+    if (!initial.frame_id.empty() && initial.frame_id != settings_.map_frame)
+      return Error{"initial pose in the frame " + initial.frame_id + "; it must be in " + settings_.map_frame};
     if (!initial.T_map_base.matrix().allFinite()) return Error{"initial pose: not a pose"};
     return mode_->expect(normalised(initial.T_map_base * moment.T_base_lidar.value_or(Pose::Identity())));
   }
@@ -152,9 +197,10 @@ class ThreadedNode final : public Node {
     outlet_.send(health);
   }
 
-  const std::string map_frame_;
+  Settings settings_;
   Outlet& outlet_;
   Inbox inbox_;
+  CloudReader clouds_;
   Moments moments_;
   std::mutex mode_mutex_, finish_mutex_;
   std::unique_ptr<Mode> mode_;
@@ -177,17 +223,10 @@ Result<std::unique_ptr<Mode>> make_mode(const Settings& settings, const Paramete
 }  // namespace
 
 std::unique_ptr<Node> Node::make(const Settings& settings, Outlet& outlet, std::string& error) {
-  Parameters values;
-  Status status = ok();
-  for (const auto& [name, value] : settings.parameters)
-    if (status) status = set_parameter(values, name, value);
-  if (status) status = validate(values);
-  if (status) {
-    auto mode = make_mode(settings, values, outlet);
-    if (mode) return std::make_unique<ThreadedNode>(settings, outlet, *std::move(mode));
-    status = mode.error();
-  }
-  error = status.error().message;
+  const auto values = parameters_of(settings);
+  auto mode = values ? make_mode(settings, *values, outlet) : Result<std::unique_ptr<Mode>>(values.error());
+  if (mode) return std::make_unique<ThreadedNode>(settings, outlet, *std::move(mode));
+  error = mode.error().message;
   return nullptr;
 }
 

@@ -20,9 +20,8 @@ class Outlet {
   virtual void send(const Graph& graph) = 0;
   virtual void send(const MapCloud& cloud) = 0;
   virtual void send(const Health& health) = 0;
-  /// tf: maps coordinates of `source` into `target` at that time. Waits for it if asked to, for a tenth of a second at
-  /// most. False where it is not known.
-  virtual bool look_up(const std::string& target, const std::string& source, std::int64_t stamp_ns, bool may_wait,
+  /// tf: maps coordinates of `source` into `target` at that time. False where it is not known yet; does not wait.
+  virtual bool look_up(const std::string& target, const std::string& source, std::int64_t stamp_ns,
                        Transform3& T_target_source) = 0;
   virtual void log(bool is_warning, const std::string& text) = 0;
 };
@@ -40,6 +39,9 @@ struct Settings {
 /// Sets one by its name; names that are none of these are taken for parameters of the program, which make() judges.
 /// False with the reason for a value that is not allowed.
 bool set(Settings& settings, const std::string& name, const std::string& text, std::string& error);
+
+/// Whether set() knows the name, or the program has a parameter of it.
+bool is_setting(const std::string& name);
 
 /// One parameter of the program, as a node declares it.
 struct ParameterText {
@@ -65,6 +67,10 @@ class Node {
   virtual bool save_map(const std::string& folder, std::string& message) = 0;
   virtual bool load_map(const std::string& path, std::string& message) = 0;
   virtual bool publish_map(std::string& message) = 0;
+  /// Of the settings, parameters that begin with "geometric." or "temporal." may change; the others must be as they
+  /// were.
+  virtual bool change(const Settings& settings, std::string& message) = 0;
+  virtual bool get_map(MapGrid& grid, std::string& message) = 0;
   /// The scans that wait are worked on, and nothing is lost. Later messages are left out.
   virtual bool finish(std::string& message) = 0;
 };

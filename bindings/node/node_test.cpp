@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "node.hpp"
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <map>
 #include <mutex>
+#include <sstream>
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -59,6 +61,41 @@ Cloud to_message(const Scan& scan, std::int64_t stamp_ns) {
   return cloud;
 }
 
+// The same as ROS 1 sends it: numbers little-endian, texts and arrays behind their lengths.
+Cloud to_wire(const Cloud& cloud) {
+  const auto bytes = std::make_shared<std::string>();
+  const auto number = [&](auto value) { bytes->append(reinterpret_cast<const char*>(&value), sizeof value); };
+  const auto text = [&](const std::string& value) {
+    number(static_cast<std::uint32_t>(value.size()));
+    *bytes += value;
+  };
+  number(std::uint32_t{0});
+  number(static_cast<std::uint32_t>(cloud.stamp_ns / 1'000'000'000));
+  number(static_cast<std::uint32_t>(cloud.stamp_ns % 1'000'000'000));
+  text(cloud.frame_id);
+  number(cloud.height);
+  number(cloud.width);
+  number(static_cast<std::uint32_t>(cloud.fields.size()));
+  for (const Cloud::Field& field : cloud.fields) {
+    text(field.name);
+    number(field.offset);
+    number(field.type);
+    number(std::uint32_t{1});
+  }
+  number(std::uint8_t{0});
+  number(cloud.point_step);
+  number(cloud.row_step);
+  text({reinterpret_cast<const char*>(cloud.data), cloud.size});
+  number(std::uint8_t{1});
+  Cloud wire;
+  wire.type = "sensor_msgs/PointCloud2";
+  wire.is_ros1 = true;
+  wire.data = reinterpret_cast<const std::uint8_t*>(bytes->data());
+  wire.size = bytes->size();
+  wire.owner = bytes;
+  return wire;
+}
+
 // Keeps what it is sent. The LiDAR is one metre ahead of the base and 1.5 above it, the IMU upside down beside it.
 class Listener final : public Outlet {
  public:
@@ -68,7 +105,7 @@ class Listener final : public Outlet {
   void send(const Graph& graph) override { keep(graphs, graph); }
   void send(const MapCloud& cloud) override { keep(clouds, cloud); }
   void send(const Health& state) override { keep(health, state); }
-  bool look_up(const std::string& target, const std::string& source, std::int64_t, bool,
+  bool look_up(const std::string& target, const std::string& source, std::int64_t,
                Transform3& T_target_source) override {
     T_target_source = Transform3::Identity();
     if (target == "base_link" && source == "lidar" && knows_base) {
@@ -121,7 +158,7 @@ std::string drive(const Settings& settings, Listener& listener, int first, int l
   for (int i = first; i < last; ++i) {
     if (with_odometry) {
       Pose T_base_lidar;
-      listener.look_up("base_link", "lidar", 0, false, T_base_lidar);
+      listener.look_up("base_link", "lidar", 0, T_base_lidar);
       const Pose T_odom_base = SyntheticWorld::at(7.0, 3.0, 0.4, 0.0) * pose_of(i) * T_base_lidar.inverse();
       node->add(Odometry{stamp_of(i), "wheels", "base_link", T_odom_base});
     }
@@ -236,6 +273,11 @@ TEST(Node, ServicesWorkBesideScans) {
   ASSERT_GE(listener.count_of_poses(), 10u);
   EXPECT_TRUE(node->publish_map(message)) << message;
   EXPECT_FALSE(listener.clouds.at(0).points.empty());
+  MapGrid grid;
+  EXPECT_TRUE(node->get_map(grid, message)) << message;
+  ASSERT_EQ(grid.cells.size(), std::size_t{grid.width} * grid.height);
+  EXPECT_GT(std::count(grid.cells.begin(), grid.cells.end(), 100), 0);
+  EXPECT_GT(std::count(grid.cells.begin(), grid.cells.end(), 0), 0);
   EXPECT_TRUE(node->save_map("", message)) << message;
   EXPECT_TRUE(std::filesystem::exists(std::filesystem::path(settings.map) / "map.ply"));
   EXPECT_FALSE(node->load_map(settings.map, message));
@@ -337,6 +379,49 @@ TEST(Node, ACloudThatIsNoneIsLeftOutAndCounted) {
   EXPECT_EQ(values.at("scans that could not be used"), "1");
 }
 
+TEST(Node, AMessageAsItWentOverTheWireIsTheSameCloud) {
+  std::vector<std::string> answers;
+  for (const bool is_serialised : {false, true}) {
+    Settings settings = settings_of("slam");
+    Listener listener;
+    std::string message;
+    const auto node = Node::make(settings, listener, message);
+    ASSERT_TRUE(node) << message;
+    for (int i = 0; i < 3; ++i) {
+      const Cloud cloud = to_message(scan_of(i), stamp_of(i));
+      node->add(is_serialised ? to_wire(cloud) : cloud);
+    }
+    EXPECT_TRUE(node->finish(message)) << message;
+    ASSERT_EQ(listener.poses.size(), 3u);
+    std::ostringstream last;
+    last << listener.poses.back().stamp_ns << " " << listener.poses.back().T_map_lidar.matrix();
+    answers.push_back(last.str());
+  }
+  EXPECT_EQ(answers[0], answers[1]);
+}
+
+TEST(Node, SomeParametersChangeWhileItRuns) {
+  Listener listener;
+  std::string message;
+  Settings settings = settings_of("detect");
+  const auto node = Node::make(settings, listener, message);
+  ASSERT_TRUE(node) << message;
+  EXPECT_TRUE(node->change(settings, message));
+  EXPECT_NE(message.find("nothing"), std::string::npos) << message;
+  settings.parameters["geometric.min_probability"] = "2";
+  EXPECT_FALSE(node->change(settings, message));
+  EXPECT_NE(message.find("geometric.min_probability"), std::string::npos) << message;
+  settings.parameters["geometric.min_probability"] = "1";
+  EXPECT_TRUE(node->change(settings, message)) << message;
+  EXPECT_NE(message.find("geometric.min_probability"), std::string::npos) << message;
+  settings.parameters["descriptor.rings"] = "10";
+  EXPECT_FALSE(node->change(settings, message));
+  EXPECT_NE(message.find("descriptor.rings"), std::string::npos) << message;
+  for (int i = 0; i < kAll; ++i) node->add(to_message(scan_of(i), stamp_of(i)));
+  EXPECT_TRUE(node->finish(message));
+  EXPECT_TRUE(listener.loops.empty()) << "none is as sure as that";
+}
+
 TEST(NodeInbox, DropsTheOldestAndCounts) {
   Inbox inbox(3);
   for (int i = 0; i < 5; ++i) inbox.add(to_message({}, stamp_of(i)));
@@ -375,9 +460,10 @@ TEST(NodeMoments, ImuOfTheSweepComesInTheLidarsFrame) {
   for (int k = -60; k <= 60; ++k)
     inbox.add(Imu{stamp_of(0) + 10'000'000LL * k, "imu", {0.1, 0.2, 0.3}, {0.0, 0.0, -9.8}});
   Moments moments(settings_of("slam"), inbox, listener);
-  Scan scan = scan_of(0);
+  ScanMessage message{stamp_of(0), to_message(scan_of(0), stamp_of(0)).frame_id, scan_of(0)};
+  Scan& scan = message.scan;
   scan.stamp_s = to_seconds(stamp_of(0));
-  const Moment moment = moments.of(to_message(scan, stamp_of(0)), scan);
+  const Moment moment = moments.of(message);
   EXPECT_TRUE(moment.T_base_lidar);
   ASSERT_EQ(scan.imu.size(), 36u) << "a quarter of a second before, a tenth after";
   EXPECT_NEAR(scan.imu.front().time_s, -0.25, 1e-9);

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <utility>
 
@@ -13,6 +15,13 @@ std::vector<ParameterText> parameters() {
   for (const ParameterInfo& each : parameter_infos())
     if (!each.name.starts_with("simulation.")) texts.push_back({each.name, each.help, each.default_value});
   return texts;
+}
+
+bool is_setting(const std::string& name) {
+  constexpr std::array kOwn{"mode", "map", "resume", "map_frame", "odom_frame", "base_frame", "queue"};
+  const std::vector<ParameterInfo>& infos = parameter_infos();
+  return std::find(kOwn.begin(), kOwn.end(), name) != kOwn.end() ||
+         std::any_of(infos.begin(), infos.end(), [&](const ParameterInfo& each) { return each.name == name; });
 }
 
 bool set(Settings& settings, const std::string& name, const std::string& text, std::string& error) {

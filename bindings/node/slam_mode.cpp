@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <filesystem>
 #include <utility>
+#include <vector>
 
 #include <revisit/core/stamps.hpp>
+#include <revisit/pipeline/map_grid.hpp>
 #include <revisit/pipeline/slam.hpp>
 
 #include "mode.hpp"
@@ -65,11 +67,23 @@ class SlamMode final : public Mode {
     send_graph();
     return std::to_string(points->size()) + " points";
   }
+  Result<MapGrid> grid() override {
+    const KeyframeGraph& graph = slam_.graph();
+    std::vector<FrameId> frames;
+    std::vector<Pose> poses;
+    for (const FrameId frame : graph.keyframes())
+      if (graph.part(frame) == graph.part(graph.keyframes().back())) {  // where the robot is
+        frames.push_back(frame);
+        poses.push_back(graph.T_world_lidar(frame));
+      }
+    return to_map_grid(settings_, grid_of_map(slam_.store(), frames, poses, {}));
+  }
   Status finish() override {
     const Status finished = slam_.finish();
     send_graph();
     return finished;
   }
+  void set_verification(const Parameters& parameters) override { slam_.set_verification(parameters); }
   std::string state() const override {
     return std::to_string(slam_.graph().keyframes().size()) + " key frames, " + std::to_string(loops_) + " loops";
   }

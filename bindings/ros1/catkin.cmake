@@ -1,10 +1,10 @@
 # As a package of a catkin workspace: `ln -s PROJECT/bindings/ros1 src/revisit_ros`, then catkin_make.
 project(revisit_ros LANGUAGES C CXX)
 set(messages diagnostic_msgs geometry_msgs nav_msgs sensor_msgs std_msgs std_srvs visualization_msgs)
-find_package(catkin REQUIRED COMPONENTS message_generation roscpp tf2_ros ${messages})
+find_package(catkin REQUIRED COMPONENTS message_generation roscpp tf2_ros topic_tools ${messages})
 add_message_files(FILES Loop.msg)
 generate_messages(DEPENDENCIES geometry_msgs std_msgs)
-catkin_package(CATKIN_DEPENDS message_runtime roscpp tf2_ros ${messages})
+catkin_package(CATKIN_DEPENDS message_runtime roscpp tf2_ros topic_tools ${messages})
 
 if(NOT CMAKE_BUILD_TYPE)
   set(CMAKE_BUILD_TYPE Release)

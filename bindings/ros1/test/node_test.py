@@ -10,6 +10,7 @@ import os
 import shutil
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -35,6 +36,8 @@ os.environ.update(ROS_MASTER_URI=f"http://127.0.0.1:{PORT}", ROS_IP="127.0.0.1",
                   ROS_HOME=WORK, ROS_LOG_DIR=WORK, PYTHONUNBUFFERED="1")
 sys.path.insert(0, MESSAGES)
 
+import genpy  # noqa: E402
+import genpy.dynamic  # noqa: E402
 import rosbag  # noqa: E402
 import rosgraph  # noqa: E402  (both read the environment)
 import rosnode  # noqa: E402
@@ -43,8 +46,10 @@ import tf2_msgs.msg  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from geometry_msgs.msg import PoseWithCovarianceStamped  # noqa: E402
 from nav_msgs.msg import Path  # noqa: E402
+from nav_msgs.srv import GetMap  # noqa: E402
 from revisit_ros.msg import Loop  # noqa: E402
 from sensor_msgs.msg import PointCloud2  # noqa: E402
+from sensor_msgs.point_cloud2 import read_points  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 
@@ -52,6 +57,42 @@ BAG = os.path.join(WORK, "warehouse.bag")
 MAP = os.path.join(WORK, "map")
 TOPICS = {"/revisit/loops": Loop, "/revisit/pose": PoseWithCovarianceStamped, "/revisit/path": Path, "/tf": tf2_msgs.msg.TFMessage,
           "/revisit/graph": MarkerArray, "/revisit/map_cloud": PointCloud2, "/diagnostics": DiagnosticArray}
+
+
+class LivoxMessage(genpy.Message):
+    """What a Livox driver sends, whose package is not installed."""
+
+    _type = "livox_ros_driver/CustomMsg"
+    _md5sum = "e4d6829bdfe657cb6c21a746c86b21a6"
+    _has_header = False
+    _full_text = """std_msgs/Header header
+uint64 timebase
+uint32 point_num
+uint8 lidar_id
+uint8[3] rsvd
+CustomPoint[] points
+================================================================================
+MSG: std_msgs/Header
+uint32 seq
+time stamp
+string frame_id
+================================================================================
+MSG: livox_ros_driver/CustomPoint
+uint32 offset_time
+float32 x
+float32 y
+float32 z
+uint8 reflectivity
+uint8 tag
+uint8 line
+"""
+    __slots__ = ["stamp_s", "points"]
+
+    def serialize(self, buff):
+        buff.write(struct.pack("<IIII5s", 0, int(self.stamp_s), round(self.stamp_s % 1 * 1e9), 5, b"lidar"))
+        buff.write(struct.pack("<QI4BI", int(self.stamp_s * 1e9), len(self.points), 0, 0, 0, 0, len(self.points)))
+        for x, y, z, intensity in self.points:
+            buff.write(struct.pack("<IfffBBB", 0, x, y, z, min(255, int(intensity)), 0, 0))
 
 
 def wait_until(condition, seconds=20):
@@ -133,6 +174,12 @@ class NodeTest(unittest.TestCase):
     def assertNear(self, a, b, most):
         self.assertLess(max(abs(x - y) for x, y in zip(a, b)), most)
 
+    def test_0_the_bag_says_what_ros_expects(self):
+        with rosbag.Bag(BAG) as bag:
+            for each in bag._get_connections():
+                made = genpy.dynamic.generate_dynamic(each.datatype, each.msg_def)[each.datatype]
+                self.assertEqual(made._md5sum, each.md5sum, each.datatype)
+
     def test_1_detect_gives_the_loops_of_the_program(self):
         node = Node("detect")
         self.assertEqual(play().wait(60), 0)
@@ -173,6 +220,10 @@ class NodeTest(unittest.TestCase):
         cloud = node.last("/revisit/map_cloud")
         self.assertGreater(cloud.width, 10000)
         self.assertEqual(cloud.header.frame_id, "map")
+        grid = rospy.ServiceProxy("/revisit/get_map", GetMap)().map
+        self.assertEqual(grid.header.frame_id, "map")
+        self.assertEqual(len(grid.data), grid.info.width * grid.info.height)
+        self.assertEqual(set(grid.data), {-1, 0, 100})
         answer = node.call("save_map")
         self.assertTrue(answer.success, answer.message)
         self.assertTrue(os.path.exists(os.path.join(MAP, "map.ply")))
@@ -206,7 +257,7 @@ class NodeTest(unittest.TestCase):
         wait_until(lambda: node.last("/diagnostics").status[0].message.startswith("followed"))
         self.assertEqual(node.end(), 0)
 
-    def test_4_goes_on_while_the_master_is_restarted(self):
+    def test_5_goes_on_while_the_master_is_restarted(self):
         global master
         node = Node("detect")
         player = play()
@@ -217,7 +268,30 @@ class NodeTest(unittest.TestCase):
         node.wait_for(SCANS)
         self.assertEqual(node.end(), 0)
 
-    def test_5_says_what_is_wrong(self):
+    def test_4_livox_messages_and_parameters_that_change(self):
+        node = Node("detect")
+        publisher = rospy.Publisher("/points", LivoxMessage, queue_size=10)
+        wait_until(publisher.get_num_connections)
+        with rosbag.Bag(BAG) as bag:
+            for i, (_, cloud, _) in enumerate(bag.read_messages(["/points"])):
+                points = list(read_points(cloud, ("x", "y", "z", "intensity"), skip_nans=True))
+                publisher.publish(LivoxMessage(stamp_s=1000 + 0.1 * i, points=points))
+                if i == 4:
+                    break
+        node.wait_for(5)
+        self.assertEqual(node.health()["scans that could not be used"], "0")
+        rospy.set_param("/revisit/geometric/min_probability", 0.99)
+        answer = node.call("update_parameters")
+        self.assertTrue(answer.success, answer.message)
+        self.assertIn("geometric.min_probability", answer.message)
+        rospy.set_param("/revisit/descriptor/rings", 10)
+        answer = node.call("update_parameters")
+        self.assertFalse(answer.success)
+        self.assertIn("descriptor.rings", answer.message)
+        publisher.unregister()
+        self.assertEqual(node.end(), 0)
+
+    def test_6_says_what_is_wrong(self):
         log = subprocess.run([NODE, "_mode:=fly"], capture_output=True, text=True, timeout=30)
         self.assertEqual(log.returncode, 1)
         self.assertIn("allowed: detect, slam, localise", log.stdout + log.stderr)
@@ -226,7 +300,7 @@ class NodeTest(unittest.TestCase):
         self.assertEqual(log.returncode, 1)
         self.assertIn("retrieval.top_k", log.stdout + log.stderr, "the nearest that there is")
 
-    def test_6_ends_without_a_master(self):
+    def test_7_ends_without_a_master(self):
         environment = dict(os.environ, ROS_MASTER_URI=f"http://127.0.0.1:{free_port()}")
         node = subprocess.Popen([NODE, "_mode:=detect"], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         time.sleep(1)

@@ -143,19 +143,12 @@ void DdsOutlet::send(const node::Health& health) {
   diagnostics_.write(message);
 }
 
-bool DdsOutlet::look_up(const std::string& target, const std::string& source, std::int64_t, bool may_wait,
+bool DdsOutlet::look_up(const std::string& target, const std::string& source, std::int64_t,
                         node::Transform3& T_target_source) {
-  for (int tries = may_wait ? 10 : 0;; --tries) {
-    {
-      const std::lock_guard lock(frames_mutex_);
-      if (const auto T = frames_.between(target, source)) {
-        T_target_source = *T;
-        return true;
-      }
-    }
-    if (tries <= 0) return false;
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
+  const std::lock_guard lock(frames_mutex_);
+  const auto T = frames_.between(target, source);
+  if (T) T_target_source = *T;
+  return T.has_value();
 }
 
 void DdsOutlet::log(bool is_warning, const std::string& text) {

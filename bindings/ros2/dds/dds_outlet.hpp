@@ -28,7 +28,7 @@ class DdsOutlet final : public node::Outlet {
   void send(const node::Graph& graph) override;
   void send(const node::MapCloud& cloud) override;
   void send(const node::Health& health) override;
-  bool look_up(const std::string& target, const std::string& source, std::int64_t stamp_ns, bool may_wait,
+  bool look_up(const std::string& target, const std::string& source, std::int64_t stamp_ns,
                node::Transform3& T_target_source) override;
   void log(bool is_warning, const std::string& text) override;
 

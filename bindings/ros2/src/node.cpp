@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The node of ROS 2, a lifecycle component. NOT COMPILED BY THIS PROJECT'S TESTS: rclcpp is in no package of Debian 12.
 // It is built by hand before a release (README.md). What it calls is the same from Humble to Rolling.
-#include <array>
 #include <chrono>
-#include <cstring>
 #include <functional>
 #include <memory>
 #include <string>
-#include <thread>
+#include <utility>
 #include <vector>
 
 #include <tf2_ros/buffer.h>
@@ -16,6 +14,7 @@
 #include <geometry_msgs/msg/pose_with_covariance_stamped.hpp>
 #include <nav_msgs/msg/odometry.hpp>
 #include <nav_msgs/msg/path.hpp>
+#include <nav_msgs/srv/get_map.hpp>
 #include <rclcpp/rclcpp.hpp>
 #include <rclcpp_components/register_node_macro.hpp>
 #include <rclcpp_lifecycle/lifecycle_node.hpp>
@@ -29,38 +28,43 @@
 #include <revisit_ros/msg/loop.hpp>
 
 #include "node.hpp"
+#include "ros_messages.hpp"
 
 namespace revisit_ros {
 namespace {
 
 namespace node = revisit::node;
-using geometry_msgs::msg::PoseWithCovarianceStamped;
-using sensor_msgs::msg::PointCloud2;
 
-builtin_interfaces::msg::Time to_time(std::int64_t ns) { return rclcpp::Time(ns); }
-template <typename Header>
-std::int64_t to_ns(const Header& header) {
-  return rclcpp::Time(header.stamp).nanoseconds();
-}
-
-geometry_msgs::msg::Pose to_pose(const node::Transform3& T) {
-  const Eigen::Quaterniond q(T.linear());
-  geometry_msgs::msg::Pose pose;
-  pose.position.x = T.translation().x(), pose.position.y = T.translation().y(), pose.position.z = T.translation().z();
-  pose.orientation.x = q.x(), pose.orientation.y = q.y(), pose.orientation.z = q.z(), pose.orientation.w = q.w();
-  return pose;
-}
-template <typename Position>
-node::Transform3 to_transform(const Position& p, const geometry_msgs::msg::Quaternion& q) {
-  return node::to_transform({p.x, p.y, p.z}, {q.w, q.x, q.y, q.z});
-}
-void set_covariance(std::array<double, 36>& values, const Eigen::Matrix<double, 6, 6>& covariance) {
-  Eigen::Map<Eigen::Matrix<double, 6, 6>>(values.data()) = covariance;
-}
+struct Ros2 {
+  using Header = std_msgs::msg::Header;
+  using Pose = geometry_msgs::msg::Pose;
+  using PoseStamped = geometry_msgs::msg::PoseStamped;
+  using PoseWithCovariance = geometry_msgs::msg::PoseWithCovariance;
+  using StampedPose = geometry_msgs::msg::PoseWithCovarianceStamped;
+  using TransformStamped = geometry_msgs::msg::TransformStamped;
+  using Path = nav_msgs::msg::Path;
+  using Odometry = nav_msgs::msg::Odometry;
+  using OccupancyGrid = nav_msgs::msg::OccupancyGrid;
+  using Marker = visualization_msgs::msg::Marker;
+  using MarkerArray = visualization_msgs::msg::MarkerArray;
+  using PointCloud2 = sensor_msgs::msg::PointCloud2;
+  using PointField = sensor_msgs::msg::PointField;
+  using Imu = sensor_msgs::msg::Imu;
+  using NavSatFix = sensor_msgs::msg::NavSatFix;
+  using NavSatStatus = sensor_msgs::msg::NavSatStatus;
+  using DiagnosticArray = diagnostic_msgs::msg::DiagnosticArray;
+  using DiagnosticStatus = diagnostic_msgs::msg::DiagnosticStatus;
+  using KeyValue = diagnostic_msgs::msg::KeyValue;
+  using Loop = msg::Loop;
+  static builtin_interfaces::msg::Time stamp(std::int64_t ns) { return rclcpp::Time(ns); }
+  static std::int64_t ns(const builtin_interfaces::msg::Time& stamp) { return rclcpp::Time(stamp).nanoseconds(); }
+};
+using Messages = node::Messages<Ros2>;
+using PointCloud2 = Ros2::PointCloud2;
 
 node::Cloud to_cloud(const PointCloud2::ConstSharedPtr& message) {
   node::Cloud cloud;
-  cloud.stamp_ns = to_ns(message->header);
+  cloud.stamp_ns = Ros2::ns(message->header.stamp);
   cloud.frame_id = message->header.frame_id;
   for (const auto& field : message->fields)
     if (field.count <= 1) cloud.fields.push_back({field.name, field.offset, field.datatype});
@@ -73,12 +77,14 @@ node::Cloud to_cloud(const PointCloud2::ConstSharedPtr& message) {
   return cloud;
 }
 
-node::GpsFix to_fix(const sensor_msgs::msg::NavSatFix& message) {
-  node::GpsFix fix{to_ns(message.header), message.latitude, message.longitude, message.altitude};
-  const auto& covariance = message.position_covariance;
-  if (message.position_covariance_type != sensor_msgs::msg::NavSatFix::COVARIANCE_TYPE_UNKNOWN)
-    fix.deviation_m = Eigen::Vector3d(covariance[0], covariance[4], covariance[8]).cwiseSqrt();
-  return fix;
+// Another message with a scan (Livox CustomMsg), as it came over the wire.
+node::Cloud to_cloud(const std::shared_ptr<rclcpp::SerializedMessage>& message, const std::string& type) {
+  node::Cloud cloud;
+  cloud.type = type;
+  cloud.data = message->get_rcl_serialized_message().buffer;
+  cloud.size = message->size();
+  cloud.owner = message;
+  return cloud;
 }
 
 }  // namespace
@@ -95,6 +101,7 @@ class RevisitNode final : public rclcpp_lifecycle::LifecycleNode, public node::O
     declare_parameter("odom_frame", defaults.odom_frame);
     declare_parameter("base_frame", defaults.base_frame);
     declare_parameter("queue", static_cast<std::int64_t>(defaults.queue));
+    declare_parameter("cloud_type", "sensor_msgs/msg/PointCloud2");  // or livox_ros_driver2/msg/CustomMsg
     for (const auto& each : node::parameters()) {
       rcl_interfaces::msg::ParameterDescriptor descriptor;
       descriptor.description = each.help;
@@ -116,43 +123,51 @@ class RevisitNode final : public rclcpp_lifecycle::LifecycleNode, public node::O
 
   Return on_configure(const State&) override {
     const rclcpp::QoS latched = rclcpp::QoS(1).transient_local();
-    loops_ = rclcpp::create_publisher<msg::Loop>(*this, "~/loops", 100);
-    loop_poses_ = rclcpp::create_publisher<PoseWithCovarianceStamped>(*this, "~/loop_poses", 100);
-    pose_ = rclcpp::create_publisher<PoseWithCovarianceStamped>(*this, "~/pose", 10);
-    path_ = rclcpp::create_publisher<nav_msgs::msg::Path>(*this, "~/path", latched);
-    graph_ = rclcpp::create_publisher<visualization_msgs::msg::MarkerArray>(*this, "~/graph", latched);
+    loops_ = rclcpp::create_publisher<Ros2::Loop>(*this, "~/loops", 100);
+    loop_poses_ = rclcpp::create_publisher<Ros2::StampedPose>(*this, "~/loop_poses", 100);
+    pose_ = rclcpp::create_publisher<Ros2::StampedPose>(*this, "~/pose", 10);
+    path_ = rclcpp::create_publisher<Ros2::Path>(*this, "~/path", latched);
+    graph_ = rclcpp::create_publisher<Ros2::MarkerArray>(*this, "~/graph", latched);
     map_ = rclcpp::create_publisher<PointCloud2>(*this, "~/map_cloud", latched);
     tf_ = rclcpp::create_publisher<tf2_msgs::msg::TFMessage>(*this, "/tf", 100);
-    diagnostics_ = rclcpp::create_publisher<diagnostic_msgs::msg::DiagnosticArray>(*this, "/diagnostics", 10);
+    diagnostics_ = rclcpp::create_publisher<Ros2::DiagnosticArray>(*this, "/diagnostics", 10);
     node::Settings settings;
     std::string error;
     if (read_settings(settings, error)) node_ = node::Node::make(settings, *this, error);
     if (!node_) RCLCPP_ERROR_STREAM(get_logger(), error);
+    on_change_ = add_on_set_parameters_callback([this](const auto& parameters) { return change(parameters); });
     return node_ ? Return::SUCCESS : Return::FAILURE;
   }
   Return on_activate(const State&) override {
     const rclcpp::QoS qos = rclcpp::SensorDataQoS();
-    listen<sensor_msgs::msg::Imu>("imu", qos, [this](const sensor_msgs::msg::Imu& m) {
-      const auto vector = [](const auto& v) { return Eigen::Vector3d(v.x, v.y, v.z); };
-      node_->add(
-          node::Imu{to_ns(m.header), m.header.frame_id, vector(m.angular_velocity), vector(m.linear_acceleration)});
+    listen<Ros2::Imu>("imu", qos, [this](const Ros2::Imu& m) { node_->add(Messages::imu(m)); });
+    listen<Ros2::Odometry>("odom", qos, [this](const Ros2::Odometry& m) { node_->add(Messages::odometry(m)); });
+    listen<Ros2::NavSatFix>("fix", qos, [this](const Ros2::NavSatFix& m) {
+      if (Messages::is_fix(m)) node_->add(Messages::fix(m));
     });
-    listen<nav_msgs::msg::Odometry>("odom", qos, [this](const nav_msgs::msg::Odometry& m) {
-      node_->add(node::Odometry{to_ns(m.header), m.header.frame_id, m.child_frame_id,
-                                to_transform(m.pose.pose.position, m.pose.pose.orientation)});
-    });
-    listen<sensor_msgs::msg::NavSatFix>("fix", qos, [this](const sensor_msgs::msg::NavSatFix& m) {
-      if (m.status.status >= sensor_msgs::msg::NavSatStatus::STATUS_FIX) node_->add(to_fix(m));
-    });
-    listen<PoseWithCovarianceStamped>("initialpose", rclcpp::QoS(1), [this](const PoseWithCovarianceStamped& m) {
-      node_->add(node::InitialPose{m.header.frame_id, to_transform(m.pose.pose.position, m.pose.pose.orientation)});
-    });
-    subscriptions_.push_back(create_subscription<PointCloud2>(
-        "points", qos, [this](PointCloud2::ConstSharedPtr m) { node_->add(to_cloud(m)); }));
+    listen<Ros2::StampedPose>("initialpose", rclcpp::QoS(1),
+                              [this](const Ros2::StampedPose& m) { node_->add(Messages::initial_pose(m)); });
+    if (const std::string type = get_parameter("cloud_type").as_string(); type == "sensor_msgs/msg/PointCloud2")
+      subscriptions_.push_back(create_subscription<PointCloud2>(
+          "points", qos, [this](PointCloud2::ConstSharedPtr m) { node_->add(to_cloud(m)); }));
+    else
+      subscriptions_.push_back(create_generic_subscription(
+          "points", type, qos,
+          [this, type](std::shared_ptr<rclcpp::SerializedMessage> m) { node_->add(to_cloud(m, type)); }));
     const auto map = [this] { return get_parameter("map").as_string(); };
     offer("~/save_map", [this, map](std::string& answer) { return node_->save_map(map(), answer); });
     offer("~/load_map", [this, map](std::string& answer) { return node_->load_map(map(), answer); });
     offer("~/publish_map", [this](std::string& answer) { return node_->publish_map(answer); });
+    using GetMap = nav_msgs::srv::GetMap;
+    services_.push_back(create_service<GetMap>(
+        "~/get_map", [this](const std::shared_ptr<GetMap::Request>, const std::shared_ptr<GetMap::Response> response) {
+          node::MapGrid grid;
+          std::string message;
+          if (node_->get_map(grid, message))
+            response->map = Messages::grid(std::move(grid), now().nanoseconds());
+          else
+            log(true, "get_map: " + message);
+        }));
     return Return::SUCCESS;
   }
   Return on_deactivate(const State&) override {
@@ -164,115 +179,34 @@ class RevisitNode final : public rclcpp_lifecycle::LifecycleNode, public node::O
   Return on_shutdown(const State&) override { return finish() ? Return::SUCCESS : Return::FAILURE; }
 
   void send(const node::Loop& loop) override {
-    msg::Loop message;
-    message.header.stamp = to_time(loop.query_stamp_ns);
-    message.header.frame_id = loop.lidar_frame;
-    message.match_stamp = to_time(loop.match_stamp_ns);
-    message.query = loop.query, message.match = loop.match;
-    message.t_match_query.pose = to_pose(loop.T_match_query);
-    set_covariance(message.t_match_query.covariance, loop.covariance);
-    message.probability = loop.probability;
-    loops_->publish(message);
-    PoseWithCovarianceStamped geometry;
-    geometry.header = message.header;
-    geometry.pose = message.t_match_query;
-    set_covariance(geometry.pose.covariance, loop.covariance_about_match);
-    loop_poses_->publish(geometry);
+    loops_->publish(Messages::loop(loop));
+    loop_poses_->publish(Messages::pose(loop));
   }
   void send(const node::Frame& frame) override {
-    geometry_msgs::msg::TransformStamped one;
-    one.header.stamp = to_time(frame.stamp_ns);
-    one.header.frame_id = frame.parent;
-    one.child_frame_id = frame.child;
-    const geometry_msgs::msg::Pose pose = to_pose(frame.T_parent_child);
-    one.transform.translation.x = pose.position.x, one.transform.translation.y = pose.position.y;
-    one.transform.translation.z = pose.position.z;
-    one.transform.rotation = pose.orientation;
     tf2_msgs::msg::TFMessage message;
-    message.transforms.push_back(one);
+    message.transforms.push_back(Messages::transform(frame));
     tf_->publish(message);
   }
-  void send(const node::MapPose& pose) override {
-    PoseWithCovarianceStamped message;
-    message.header.stamp = to_time(pose.stamp_ns);
-    message.header.frame_id = pose.map_frame;
-    message.pose.pose = to_pose(pose.T_map_lidar);
-    set_covariance(message.pose.covariance, pose.covariance);
-    pose_->publish(message);
-  }
+  void send(const node::MapPose& pose) override { pose_->publish(Messages::pose(pose)); }
   void send(const node::Graph& graph) override {
-    nav_msgs::msg::Path path;
-    path.header.frame_id = graph.map_frame;
-    if (!graph.path.empty()) path.header.stamp = to_time(graph.path.back().first);
-    for (const auto& [stamp_ns, T] : graph.path) {
-      geometry_msgs::msg::PoseStamped pose;
-      pose.header.frame_id = graph.map_frame;
-      pose.header.stamp = to_time(stamp_ns);
-      pose.pose = to_pose(T);
-      path.poses.push_back(pose);
-    }
-    visualization_msgs::msg::Marker lines;
-    lines.header = path.header;
-    lines.ns = "loops";
-    lines.type = visualization_msgs::msg::Marker::LINE_LIST;
-    lines.pose.orientation.w = 1.0;
-    lines.scale.x = 0.1;
-    lines.color.r = 0.84f, lines.color.g = 0.37f, lines.color.a = 1.f;
-    for (const auto& [from, to] : graph.loops)
-      for (const std::size_t end : {from, to}) lines.points.push_back(path.poses[end].pose.position);
-    visualization_msgs::msg::MarkerArray markers;
-    markers.markers.push_back(lines);
-    path_->publish(path);
-    graph_->publish(markers);
+    path_->publish(Messages::path(graph));
+    graph_->publish(Messages::loops(graph));
   }
   void send(const node::MapCloud& cloud) override {
-    auto message = std::make_unique<PointCloud2>();
-    message->header.frame_id = cloud.map_frame;
-    message->header.stamp = now();
-    const std::string names[] = {"x", "y", "z", "intensity"};
-    for (std::uint32_t i = 0; i < 4; ++i) {
-      sensor_msgs::msg::PointField field;
-      field.name = names[i], field.offset = 4 * i, field.count = 1;
-      field.datatype = sensor_msgs::msg::PointField::FLOAT32;
-      message->fields.push_back(field);
-    }
-    message->height = 1;
-    message->width = static_cast<std::uint32_t>(cloud.points.size() / 4);
-    message->point_step = 16;
-    message->row_step = 16 * message->width;
-    message->is_dense = true;
-    message->data.resize(message->row_step);
-    std::memcpy(message->data.data(), cloud.points.data(), message->data.size());
-    map_->publish(std::move(message));
+    map_->publish(std::make_unique<PointCloud2>(Messages::cloud(cloud, now().nanoseconds())));
   }
   void send(const node::Health& health) override {
-    diagnostic_msgs::msg::DiagnosticStatus status;
-    status.name = get_fully_qualified_name();
-    status.level = static_cast<std::uint8_t>(health.level);
-    status.message = health.message;
-    for (const auto& [key, value] : health.values) {
-      diagnostic_msgs::msg::KeyValue pair;
-      pair.key = key, pair.value = value;
-      status.values.push_back(pair);
-    }
-    diagnostic_msgs::msg::DiagnosticArray message;
-    message.header.stamp = now();
-    message.status.push_back(status);
-    diagnostics_->publish(message);
+    diagnostics_->publish(Messages::health(health, get_fully_qualified_name(), now().nanoseconds()));
   }
-  // tf2's own wait goes by the simulated clock, which may stand still.
-  bool look_up(const std::string& target, const std::string& source, std::int64_t stamp_ns, bool may_wait,
+  bool look_up(const std::string& target, const std::string& source, std::int64_t stamp_ns,
                node::Transform3& T_target_source) override {
-    const tf2::TimePoint stamp{std::chrono::nanoseconds(stamp_ns)};
-    for (int tries = may_wait ? 10 : 0;; --tries) {
-      try {
-        const auto found = tf_buffer_.lookupTransform(target, source, stamp).transform;
-        T_target_source = to_transform(found.translation, found.rotation);
-        return true;
-      } catch (const tf2::TransformException&) {
-        if (tries <= 0) return false;
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
-      }
+    try {
+      const tf2::TimePoint stamp{std::chrono::nanoseconds(stamp_ns)};
+      const auto found = tf_buffer_.lookupTransform(target, source, stamp).transform;
+      T_target_source = Messages::transform(found.translation, found.rotation);
+      return true;
+    } catch (const tf2::TransformException&) {
+      return false;
     }
   }
   void log(bool is_warning, const std::string& text) override {
@@ -290,6 +224,17 @@ class RevisitNode final : public rclcpp_lifecycle::LifecycleNode, public node::O
       if (const std::string text = get_parameter(each.name).value_to_string(); text != each.value)
         if (!node::set(settings, each.name, text, error)) return false;
     return true;
+  }
+  // Before they are set; what must stay as it was is refused with the reason.
+  rcl_interfaces::msg::SetParametersResult change(const std::vector<rclcpp::Parameter>& parameters) {
+    rcl_interfaces::msg::SetParametersResult result;
+    node::Settings settings;
+    result.successful = read_settings(settings, result.reason);
+    for (const rclcpp::Parameter& each : parameters)  // others are ROS's own
+      if (result.successful && node::is_setting(each.get_name()))
+        result.successful = node::set(settings, each.get_name(), each.value_to_string(), result.reason);
+    if (result.successful && node_) result.successful = node_->change(settings, result.reason);
+    return result;
   }
   template <typename Message, typename Use>
   void listen(const std::string& topic, const rclcpp::QoS& qos, Use use) {
@@ -317,13 +262,14 @@ class RevisitNode final : public rclcpp_lifecycle::LifecycleNode, public node::O
   tf2_ros::Buffer tf_buffer_;
   tf2_ros::TransformListener tf_listener_;
   rclcpp::TimerBase::SharedPtr start_;
-  rclcpp::Publisher<msg::Loop>::SharedPtr loops_;
-  rclcpp::Publisher<PoseWithCovarianceStamped>::SharedPtr loop_poses_, pose_;
-  rclcpp::Publisher<nav_msgs::msg::Path>::SharedPtr path_;
-  rclcpp::Publisher<visualization_msgs::msg::MarkerArray>::SharedPtr graph_;
+  OnSetParametersCallbackHandle::SharedPtr on_change_;
+  rclcpp::Publisher<Ros2::Loop>::SharedPtr loops_;
+  rclcpp::Publisher<Ros2::StampedPose>::SharedPtr loop_poses_, pose_;
+  rclcpp::Publisher<Ros2::Path>::SharedPtr path_;
+  rclcpp::Publisher<Ros2::MarkerArray>::SharedPtr graph_;
   rclcpp::Publisher<PointCloud2>::SharedPtr map_;
   rclcpp::Publisher<tf2_msgs::msg::TFMessage>::SharedPtr tf_;
-  rclcpp::Publisher<diagnostic_msgs::msg::DiagnosticArray>::SharedPtr diagnostics_;
+  rclcpp::Publisher<Ros2::DiagnosticArray>::SharedPtr diagnostics_;
   std::vector<rclcpp::SubscriptionBase::SharedPtr> subscriptions_;
   std::vector<rclcpp::ServiceBase::SharedPtr> services_;
   std::unique_ptr<node::Node> node_;  // the last: its thread publishes until it ends
