@@ -1,5 +1,5 @@
 # The front door on a bare Debian 12 machine. `make demo` and `make test` install what is missing, build and run.
-.PHONY: demo ros1 ros1-demo ros2 test oracles build configure packages bench lint format sanitize clean
+.PHONY: demo python ros1 ros1-demo ros2 test oracles build configure packages bench lint format sanitize clean
 JOBS ?= $(shell nproc)
 # What ccache keeps of one clone serves the others.
 export CCACHE_BASEDIR ?= $(CURDIR)
@@ -26,6 +26,17 @@ ros2: packages
 	@scripts/install_packages.sh $$(grep -v '^#' bindings/ros2/packages.txt)
 	@cmake --preset release --log-level=NOTICE > /dev/null
 	cmake --build --preset release --parallel $(JOBS) --target revisit_dds_node
+
+# The Python package as a wheel (out/python), installed into a fresh environment and tested there.
+python: packages
+	@scripts/install_packages.sh $$(grep -v '^#' bindings/python/packages.txt)
+	@mkdir -p out/python && rm -rf out/python/* bindings/python/build bindings/python/*.egg-info
+	cd bindings/python && REVISIT_PYTHON_BUILD=$(CURDIR)/build/python /usr/bin/python3 -m build --wheel --no-isolation --outdir ../../out/python > /dev/null
+	@rm -rf bindings/python/build bindings/python/*.egg-info
+	@/usr/bin/python3 -m venv --system-site-packages out/python/venv
+	@out/python/venv/bin/pip install --quiet --no-index --no-deps out/python/*.whl
+	cd out/python && venv/bin/python -m pytest -q -p no:cacheprovider ../../bindings/python/tests
+	@ls -sh out/python/*.whl
 
 test: oracles build
 	ctest --preset release --parallel $(JOBS)

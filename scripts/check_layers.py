@@ -53,6 +53,7 @@ DOORS = {
     "tf2_ros/": {"bindings/ros1", "bindings/ros2/src"},
     "rclcpp": {"bindings/ros2/src"},
     "dds/": {"bindings/ros2/dds"},
+    "pybind11/": {"bindings/python"},
 }
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
 

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstring>
+#include <sstream>
+
+#include <revisit/io/point_cloud.hpp>
+
+#include "bind.hpp"
+
+namespace revisit::python {
+namespace {
+
+std::string shape_of(const py::array& array) {
+  std::ostringstream text;
+  text << "(";
+  for (py::ssize_t i = 0; i < array.ndim(); ++i) text << (i > 0 ? ", " : "") << array.shape(i);
+  text << ") of " << py::str(array.dtype()).cast<std::string>();
+  return text.str();
+}
+
+// One value a point, or none.
+template <typename T>
+std::vector<T> column(const py::object& values, const char* name, std::size_t points) {
+  if (values.is_none()) return {};
+  const auto array = py::array_t<T, py::array::c_style | py::array::forcecast>::ensure(values);
+  if (!array) throw py::error_already_set();
+  if (array.ndim() != 1 || static_cast<std::size_t>(array.shape(0)) != points)
+    throw py::value_error(std::string(name) + " has shape " + shape_of(array) + "; allowed: one value a point, " +
+                          std::to_string(points));
+  return {array.data(), array.data() + points};
+}
+
+struct Columns {
+  std::vector<float> intensity, time;
+  std::vector<std::uint16_t> ring;
+};
+
+// Reads each value where it lies, whatever the strides.
+template <typename T>
+Scan read_points(const py::array& array, Columns columns) {
+  const auto count = static_cast<std::size_t>(array.shape(0));
+  const bool has_intensity = columns.intensity.empty() && array.shape(1) == 4;
+  const py::ssize_t row = array.strides(0), step = array.strides(1);
+  const auto* data = static_cast<const char*>(array.data());
+  return without_lock([&] {
+    Scan scan;
+    scan.points.reserve(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto at = [&](py::ssize_t column) {
+        T value;
+        std::memcpy(&value, data + static_cast<py::ssize_t>(i) * row + column * step, sizeof value);
+        return static_cast<float>(value);
+      };
+      Point p{at(0), at(1), at(2), has_intensity ? at(3) : columns.intensity.empty() ? 0.f : columns.intensity[i]};
+      if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
+        ++scan.dropped_non_finite;
+        continue;
+      }
+      if (p.x == 0.f && p.y == 0.f && p.z == 0.f) {
+        ++scan.dropped_at_origin;
+        continue;
+      }
+      if (!std::isfinite(p.intensity)) p.intensity = 0.f;
+      scan.points.push_back(p);
+      if (!columns.time.empty()) scan.times_s.push_back(columns.time[i]);
+      if (!columns.ring.empty()) scan.rings.push_back(columns.ring[i]);
+    }
+    return scan;
+  });
+}
+
+// sensor_msgs/PointField's number of a type of numpy; 0 for others.
+std::uint8_t field_type(const py::dtype& type) {
+  const std::string kinds = "iuiuiuff", sizes = "11224448";
+  for (std::size_t i = 0; i < kinds.size(); ++i)
+    if (type.kind() == kinds[i] && type.itemsize() == sizes[i] - '0') return static_cast<std::uint8_t>(i + 1);
+  return 0;
+}
+
+Scan read_records(const py::array& records) {
+  PointCloudView view;
+  const auto fields = records.dtype().attr("fields").cast<py::dict>();
+  for (const auto& [name, description] : fields) {
+    const auto parts = description.cast<py::tuple>();
+    const auto type = parts[0].cast<py::dtype>();
+    if (const std::uint8_t number = field_type(type); number != 0)
+      view.fields.push_back({name.cast<std::string>(), parts[1].cast<std::uint32_t>(), number});
+  }
+  const auto flat = py::array::ensure(records.attr("ravel")(), py::array::c_style);
+  view.width = static_cast<std::size_t>(flat.size());
+  view.point_step = static_cast<std::size_t>(flat.itemsize());
+  view.data = {static_cast<const std::uint8_t*>(flat.data()), view.width * view.point_step};
+  const LogSink log = log_sink();
+  auto scan = without_lock([&] { return revisit::to_scan(view, std::nullopt, "an array of points", log); });
+  if (!scan) throw py::value_error(scan.error().message);
+  scan->stamp_s = 0.0;
+  return *std::move(scan);
+}
+
+struct CandidateRecord {
+  std::int64_t match;
+  double geometry_score, intensity_score, yaw_rad;
+};
+
+}  // namespace
+
+void register_dtypes() { PYBIND11_NUMPY_DTYPE(CandidateRecord, match, geometry_score, intensity_score, yaw_rad); }
+
+py::array to_array(const std::vector<LoopCandidate>& candidates) {
+  std::vector<CandidateRecord> records;
+  records.reserve(candidates.size());
+  for (const LoopCandidate& each : candidates)
+    records.push_back({each.match.value, each.geometry_score, each.intensity_score, each.yaw_rad});
+  return py::array_t<CandidateRecord>(static_cast<py::ssize_t>(records.size()), records.data());
+}
+
+Scan to_scan(const py::object& points, const py::object& intensity, const py::object& time, const py::object& ring) {
+  const bool has_columns = !intensity.is_none() || !time.is_none() || !ring.is_none();
+  if (py::isinstance<Scan>(points)) {
+    if (has_columns) throw py::value_error("a Scan has its own intensities, times and rings");
+    return points.cast<Scan>();
+  }
+  const auto array = py::array::ensure(points);
+  if (!array) throw py::error_already_set();
+  if (array.dtype().has_fields()) {
+    if (has_columns) throw py::value_error("a structured array has its own intensities, times and rings");
+    return read_records(array);
+  }
+  const bool is_float = array.dtype().kind() == 'f' && (array.itemsize() == 4 || array.itemsize() == 8);
+  if (array.ndim() != 2 || (array.shape(1) != 3 && array.shape(1) != 4) || !is_float ||
+      !array.dtype().attr("isnative").cast<bool>())
+    throw py::value_error("points have shape " + shape_of(array) +
+                          "; allowed: (N, 3) or (N, 4) of float32 or float64, or a structured array with x, y, z");
+  const auto count = static_cast<std::size_t>(array.shape(0));
+  Columns columns{column<float>(intensity, "intensity", count), column<float>(time, "time", count),
+                  column<std::uint16_t>(ring, "ring", count)};
+  return array.itemsize() == 4 ? read_points<float>(array, std::move(columns))
+                               : read_points<double>(array, std::move(columns));
+}
+
+Pose to_pose(const Eigen::Matrix4d& matrix) {
+  const Eigen::Matrix3d R = matrix.topLeftCorner<3, 3>();
+  constexpr double kTolerance = 1e-3;
+  const bool is_pose = matrix.allFinite() && (R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < kTolerance &&
+                       R.determinant() > 0.0 && matrix.row(3).isApprox(Eigen::RowVector4d(0, 0, 0, 1), kTolerance);
+  if (!is_pose) {
+    std::ostringstream text;
+    text << "a pose is\n" << matrix << "\nallowed: a finite 4 x 4 matrix [R t; 0 0 0 1] with a rotation R";
+    throw py::value_error(text.str());
+  }
+  Pose T = Pose::Identity();
+  T.translation() = matrix.topRightCorner<3, 1>();
+  T.linear() = R;
+  return T;
+}
+
+std::optional<Pose> to_pose(const std::optional<Eigen::Matrix4d>& matrix) {
+  return matrix ? std::optional(to_pose(*matrix)) : std::nullopt;
+}
+
+py::array_t<double> to_array(const std::vector<Pose>& poses) {
+  py::array_t<double> array({static_cast<py::ssize_t>(poses.size()), py::ssize_t{4}, py::ssize_t{4}});
+  auto values = array.mutable_unchecked<3>();
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    for (int row = 0; row < 4; ++row)
+      for (int c = 0; c < 4; ++c) values(static_cast<py::ssize_t>(i), row, c) = poses[i].matrix()(row, c);
+  return array;
+}
+
+py::array_t<float> to_array(const std::vector<Point>& points) {
+  py::array_t<float> array({static_cast<py::ssize_t>(points.size()), py::ssize_t{4}});
+  if (!points.empty()) std::memcpy(array.mutable_data(), points.data(), points.size() * sizeof(Point));
+  return array;
+}
+
+}  // namespace revisit::python

@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: Apache-2.0
+import csv
+import gc
+import json
+import logging
+import os
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pytest
+
+import revisit
+
+
+def test_five_lines_find_the_loop_of_kitti(shared):
+    loops = revisit.detect(shared / "kitti00_mini", progress=False)
+    assert (4501, 52) in [(loop.query, loop.match) for loop in loops]
+
+
+def test_the_loops_are_those_of_the_program(drive, short_past, tmp_path):
+    settings = tmp_path / "drive.toml"
+    settings.write_text('[simulation]\nworld = "warehouse"\nsensor = "vlp16"\nseed = 5\nframes = 150\n')
+    revisit.run("detect", settings, "--out", tmp_path / "out", "--retrieval.exclude_s", "5.05")
+    with open(tmp_path / "out" / "loops.csv") as file:
+        rows = list(csv.DictReader(file))
+    loops = revisit.detect(drive, short_past, progress=False)
+    assert len(loops) > 20
+    assert [(int(row["query"]), int(row["match"])) for row in rows] == [(loop.query, loop.match) for loop in loops]
+    for row, loop in zip(rows, loops):
+        for axis, name in enumerate(("tx", "ty", "tz")):
+            assert row[name] == f"{loop.T_match_query[axis, 3]:.10g}"
+
+
+def test_results_are_easy_to_look_at(scans, short_past):
+    detector = revisit.LoopDetector(short_past)
+    found = [detector.process(scan) for scan in scans]
+    assert len(detector) > 100
+    loop = next(each.loop for each in reversed(found) if each.loop)
+    assert loop.T_match_query.shape == (4, 4) and loop.information.shape == (6, 6) and 0.95 <= loop.probability <= 1
+    assert set(loop.to_dict()) == set(loop._fields) and "yaw" in repr(loop)
+    assert found[0].loop is None and found[0].reason == "no searchable past"
+    candidates = found[-1].candidates
+    assert candidates.dtype.names == ("match", "geometry_score", "intensity_score", "yaw_rad") and len(candidates) > 3
+
+
+def test_scans_that_are_given_are_not_changed(scans):
+    before = scans[3].points.copy()
+    detector = revisit.LoopDetector()
+    detector.process(scans[3])
+    array = before.astype(np.float64)
+    detector.process(array, stamp=1.0)
+    np.testing.assert_array_equal(scans[3].points, before)
+    np.testing.assert_array_equal(array, before)
+
+
+def test_what_describes_no_place_is_an_error_and_the_next_scan_works(scans):
+    detector = revisit.LoopDetector()
+    with pytest.raises(revisit.Error, match="frame 0"):
+        detector.process(np.ones((5, 3)))
+    assert detector.process(scans[0]).frame == 0
+    with pytest.raises(ValueError, match="a pose is"):
+        detector.process(scans[1], pose=np.full((4, 4), np.nan))
+
+
+def test_two_scans_are_registered(drive, scans):
+    found = revisit.register_scans(scans[5], scans[0])
+    truth = np.linalg.inv(drive.pose(0)) @ drive.pose(5)
+    assert found.is_accepted and found.reason == ""
+    np.testing.assert_allclose(found.T_target_source, truth, atol=0.05)
+
+
+def test_a_map_is_made_and_woken_up_in(drive, scans, tmp_path):
+    slam = revisit.Slam(tmp_path / "map")
+    steps = [slam.process(scan) for scan in scans[:120]]
+    assert steps[0].is_keyframe and all(step.is_tracked for step in steps)
+    slam.finish()
+    trajectory = slam.trajectory()
+    assert len(trajectory) == 120 and trajectory.poses.shape == (120, 4, 4)
+    driven = np.linalg.inv(drive.pose(0)) @ drive.pose(119)
+    np.testing.assert_allclose(trajectory.poses[-1][:3, 3], driven[:3, 3], atol=0.1)
+    assert slam.map().shape[1] == 4 and len(slam.map()) > 1000
+    done = []
+    assert slam.write_map(tmp_path / "map", done.append) > 1000 and done
+    del slam
+    localiser = revisit.Localiser(tmp_path / "map")
+    found = localiser.locate(scans[20])
+    assert found.status == "found", found.reason
+    np.testing.assert_allclose(found.T_map_lidar, np.linalg.inv(drive.pose(0)) @ drive.pose(20), atol=0.1)
+    assert [localiser.follow(scan).status for scan in scans[30:35]][1:] == ["followed"] * 4
+
+
+def test_an_odometry_of_ones_own(drive, scans):
+    slam = revisit.Slam(odometry=lambda scan: drive.pose(scan.frame))
+    for scan in scans[:20]:
+        slam.process(scan)
+    truth = np.linalg.inv(drive.pose(0)) @ drive.pose(19)
+    np.testing.assert_allclose(slam.trajectory().poses[-1], truth, atol=1e-6)
+
+
+def test_places_are_added_searched_saved_and_opened(scans, tmp_path):
+    descriptors = [revisit.describe(scan) for scan in scans[:40]]
+    assert descriptors[0].intensity.shape == (20, 30) and descriptors[0].occupancy.shape == (4, 20, 30)
+    index = revisit.PlaceIndex()
+    for frame, descriptor in enumerate(descriptors):
+        index.add(frame, descriptor)
+    best = index.search(descriptors[7])[0]
+    assert best["match"] == 7 and best["geometry_score"] == 1.0
+    index.save(tmp_path / "index")
+    again = revisit.PlaceIndex.open(tmp_path / "index")
+    assert len(again) == 40
+    np.testing.assert_array_equal(again.search(descriptors[9]), index.search(descriptors[9]))
+    with pytest.raises(ValueError):
+        index.add(3, descriptors[3])
+
+
+def test_errors_of_files_name_them(tmp_path):
+    with pytest.raises(FileNotFoundError, match="nowhere"):
+        revisit.open_recording(tmp_path / "nowhere")
+    (tmp_path / "broken.bag").write_bytes(b"#ROSBAG V2.0\nnonsense")
+    with pytest.raises(revisit.Error, match="broken.bag"):
+        revisit.open_recording(tmp_path / "broken.bag")
+    with pytest.raises(FileNotFoundError):
+        revisit.Localiser(tmp_path / "nowhere")
+
+
+def test_recordings_are_sequences(drive):
+    assert len(list(drive)) == len(drive) == 150 and drive[-1].frame == drive.frame(149)
+    assert drive.wheel_pose(3).shape == (4, 4)
+    with pytest.raises(IndexError):
+        drive[150]
+
+
+def test_messages_go_to_logging(scans, caplog):
+    with caplog.at_level(logging.INFO, logger="revisit"):
+        revisit.LoopDetector().process(scans[0])
+    assert any("rings" in record.message for record in caplog.records)
+
+
+def test_threads_work_side_by_side_and_agree(scans, short_past):
+    expected = [d.loop.to_dict()["match"] if d.loop else None for d in map(revisit.LoopDetector(short_past).process, scans)]
+    shared, index, results = revisit.LoopDetector(short_past), revisit.PlaceIndex(), {}
+    descriptors = [revisit.describe(scan) for scan in scans[:30]]
+
+    def own(number):
+        detector = revisit.LoopDetector(short_past)
+        results[number] = [d.loop.match if d.loop else None for d in map(detector.process, scans)]
+
+    def together(number):
+        for i, scan in enumerate(scans[:30]):
+            try:
+                shared.process(scan, frame=1000 * number + i)
+            except ValueError:  # another thread was faster: frames increase
+                pass
+            if number == 0:
+                index.add(i, descriptors[i])
+            else:
+                index.search(descriptors[i])
+
+    threads = [threading.Thread(target=own, args=(i,)) for i in range(2)]
+    threads += [threading.Thread(target=together, args=(i,)) for i in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert results[0] == results[1] == expected
+
+
+def test_memory_stays_where_it_is(scans):
+    def resident_kB():
+        with open("/proc/self/status") as file:
+            return next(int(line.split()[1]) for line in file if line.startswith("VmRSS"))
+
+    points = scans[0].points[::20].copy()
+    for _ in range(200):
+        revisit.Scan(points).points
+        revisit.describe(points)
+    gc.collect()
+    before = resident_kB()
+    for _ in range(3300):  # three calls each
+        scan = revisit.Scan(points)
+        scan.points
+        revisit.describe(scan)
+    gc.collect()
+    assert resident_kB() - before < 8000
+
+
+def test_the_program_comes_with_it(tmp_path):
+    done = subprocess.run([sys.executable, "-m", "revisit", "--version"], capture_output=True, text=True, env=os.environ)
+    assert done.returncode == 0 and revisit.__version__ in done.stdout
+    with pytest.raises(revisit.Error, match="nowhere"):
+        revisit.run("info", tmp_path / "nowhere")
+    drive = tmp_path / "drive.toml"
+    drive.write_text('[simulation]\nworld = "warehouse"\nsensor = "vlp16"\nseed = 5\nframes = 60\n')
+    revisit.run("detect", drive, "--out", tmp_path / "out", "--retrieval.exclude_s", "2")
+    tables = revisit.evaluate(tmp_path / "out", drive)
+    assert json.dumps(tables) and tables
+
+
+class RingKey:
+    """A method of a few lines: how many points lie in each ring around the sensor."""
+
+    def describe(self, scan):
+        ranges = np.linalg.norm(scan.points[:, :2], axis=1)
+        return np.histogram(ranges, bins=40, range=(0, 80))[0] / len(ranges)
+
+    def similarity(self, query, places):
+        return -np.abs(places - query).sum(axis=1)
+
+
+def test_a_method_of_ones_own_is_measured_beside_ours(tmp_path, short_past):
+    drive = tmp_path / "drive.toml"
+    drive.write_text('[simulation]\nworld = "warehouse"\nsensor = "vlp16"\nseed = 5\nframes = 150\n')
+    tables = revisit.compare(drive, tmp_path / "out", ["revisit"], own={"ring key": RingKey()},
+                             parameters=short_past)
+    assert set(tables) == {"program", "ring key"}
+    assert (tmp_path / "out" / "ring key" / "evaluation.json").exists()
+
+
+def test_pictures(scans, tmp_path):
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    from revisit import plot
+    slam = revisit.Slam()
+    for scan in scans[:30]:
+        slam.process(scan)
+    found = revisit.register_scans(scans[5], scans[0])
+    for name, ax in {"trajectory": plot.trajectory(slam.trajectory(), slam.loops()), "scan": plot.scan(scans[0]),
+                     "registration": plot.registration(scans[5], scans[0], found.T_target_source),
+                     "descriptor": plot.descriptor(revisit.describe(scans[0])), "map": plot.map(slam.map()),
+                     "curve": plot.precision_recall([3, 2, 1], [True, True, False], 4, label="ours")}.items():
+        assert ax.get_xlabel() and ax.get_ylabel()
+        ax.figure.savefig(tmp_path / f"{name}.png", dpi=60)
+        plt.close(ax.figure)
