@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cstring>
 #include <sstream>
 
@@ -36,34 +37,68 @@ struct Columns {
 
 // Reads each value where it lies, whatever the strides.
 template <typename T>
+std::vector<Point> read_strided(const char* data, std::size_t count, py::ssize_t row, py::ssize_t step, int columns) {
+  std::vector<Point> points;
+  points.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto at = [&](py::ssize_t column) {
+      T value;
+      std::memcpy(&value, data + static_cast<py::ssize_t>(i) * row + column * step, sizeof value);
+      return static_cast<float>(value);
+    };
+    points.push_back({at(0), at(1), at(2), columns == 4 ? at(3) : 0.f});
+  }
+  return points;
+}
+
+bool is_finite(const Point& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
+
+// Passes without branches, by the bits of the floats: most scans hold none.
+bool has_points_that_are_none(const std::vector<Point>& points) {
+  constexpr std::uint32_t kWithoutSign = 0x7FFFFFFF, kInfinite = 0x7F800000;
+  std::uint32_t not_finite = 0, at_origin = 0;
+  for (const Point& p : points) {
+    std::uint32_t bits[4];
+    std::memcpy(bits, &p, sizeof bits);
+    for (std::uint32_t& each : bits) each &= kWithoutSign;
+    for (const std::uint32_t each : bits) not_finite |= each + (kWithoutSign + 1 - kInfinite);  // carries into the sign
+    at_origin |= (bits[0] | bits[1] | bits[2]) - 1;
+  }
+  return ((not_finite | at_origin) & ~kWithoutSign) != 0;
+}
+
+void leave_out_points_that_are_none(Scan& scan) {
+  keep_points(scan, [&](std::size_t i) {
+    Point& p = scan.points[i];
+    if (!std::isfinite(p.intensity)) p.intensity = 0.f;
+    const bool is_at_origin = p.x == 0.f && p.y == 0.f && p.z == 0.f;
+    scan.dropped_non_finite += is_finite(p) ? 0 : 1;
+    scan.dropped_at_origin += is_at_origin ? 1 : 0;
+    return is_finite(p) && !is_at_origin;
+  });
+}
+
 Scan read_points(const py::array& array, Columns columns) {
   const auto count = static_cast<std::size_t>(array.shape(0));
-  const bool has_intensity = columns.intensity.empty() && array.shape(1) == 4;
+  const int width = static_cast<int>(array.shape(1));
   const py::ssize_t row = array.strides(0), step = array.strides(1);
+  const bool is_float = array.itemsize() == sizeof(float);
+  const bool lies_as_points = is_float && width == 4 && step == sizeof(float) && row == sizeof(Point) &&
+                              reinterpret_cast<std::uintptr_t>(array.data()) % alignof(Point) == 0;
   const auto* data = static_cast<const char*>(array.data());
   return without_lock([&] {
     Scan scan;
-    scan.points.reserve(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      const auto at = [&](py::ssize_t column) {
-        T value;
-        std::memcpy(&value, data + static_cast<py::ssize_t>(i) * row + column * step, sizeof value);
-        return static_cast<float>(value);
-      };
-      Point p{at(0), at(1), at(2), has_intensity ? at(3) : columns.intensity.empty() ? 0.f : columns.intensity[i]};
-      if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
-        ++scan.dropped_non_finite;
-        continue;
-      }
-      if (p.x == 0.f && p.y == 0.f && p.z == 0.f) {
-        ++scan.dropped_at_origin;
-        continue;
-      }
-      if (!std::isfinite(p.intensity)) p.intensity = 0.f;
-      scan.points.push_back(p);
-      if (!columns.time.empty()) scan.times_s.push_back(columns.time[i]);
-      if (!columns.ring.empty()) scan.rings.push_back(columns.ring[i]);
+    if (lies_as_points) {
+      const auto* points = reinterpret_cast<const Point*>(data);
+      scan.points.assign(points, points + count);
+    } else {
+      scan.points = is_float ? read_strided<float>(data, count, row, step, width)
+                             : read_strided<double>(data, count, row, step, width);
     }
+    for (std::size_t i = 0; i < columns.intensity.size(); ++i) scan.points[i].intensity = columns.intensity[i];
+    scan.times_s = std::move(columns.time);
+    scan.rings = std::move(columns.ring);
+    if (has_points_that_are_none(scan.points)) leave_out_points_that_are_none(scan);
     return scan;
   });
 }
@@ -133,8 +168,7 @@ Scan to_scan(const py::object& points, const py::object& intensity, const py::ob
   const auto count = static_cast<std::size_t>(array.shape(0));
   Columns columns{column<float>(intensity, "intensity", count), column<float>(time, "time", count),
                   column<std::uint16_t>(ring, "ring", count)};
-  return array.itemsize() == 4 ? read_points<float>(array, std::move(columns))
-                               : read_points<double>(array, std::move(columns));
+  return read_points(array, std::move(columns));
 }
 
 Pose to_pose(const Eigen::Matrix4d& matrix) {
