@@ -19,7 +19,8 @@ SENSORS = {
 ARGUMENTS = {
     "sensor": ("any", "one of " + ", ".join(SENSORS)),
     "mode": ("slam", "detect (loops for another SLAM), slam (a map), localise (in a saved map)"),
-    "points": ("", "sensor_msgs/PointCloud2; empty: the sensor's"),
+    "points": ("", "topic of the clouds; empty: the sensor's"),
+    "cloud_type": ("sensor_msgs/msg/PointCloud2", "or livox_ros_driver2/msg/CustomMsg"),
     "imu": ("", "sensor_msgs/Imu; empty: the sensor's"),
     "odom": ("odom", "nav_msgs/Odometry; FAST-LIO: /Odometry"),
     "fix": ("fix", "sensor_msgs/NavSatFix"),
@@ -36,7 +37,7 @@ ARGUMENTS = {
 def nodes(context):
     value = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
     points, imu = SENSORS[value["sensor"]]
-    parameters = {name: value[name] for name in ("mode", "map", "map_frame", "odom_frame", "base_frame")}
+    parameters = {name: value[name] for name in ("mode", "map", "map_frame", "odom_frame", "base_frame", "cloud_type")}
     parameters.update({name: value[name] == "true" for name in ("resume", "use_sim_time")})
     remappings = [("points", value["points"] or points), ("imu", value["imu"] or imu), ("odom", value["odom"]),
                   ("fix", value["fix"])]
