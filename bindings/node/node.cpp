@@ -8,6 +8,7 @@
 #include <mutex>
 #include <set>
 #include <thread>
+#include <tuple>
 #include <utility>
 
 #include <revisit/core/stopwatch.hpp>
@@ -29,6 +30,12 @@ Result<Parameters> parameters_of(const Settings& settings) {
 
 // The names of what differs. An error where something does that must stay while a node runs.
 Result<std::string> changes_of(const Settings& before, const Settings& after) {
+  const auto fixed = [](const Settings& of) {
+    return std::tie(of.mode, of.resume, of.map_frame, of.odom_frame, of.base_frame, of.queue);
+  };
+  if (fixed(before) != fixed(after))
+    return Error{
+        "mode, resume, queue and the frames cannot change while the node runs; geometric.* and temporal.* can"};
   std::set<std::pair<std::string, std::string>> was(before.parameters.begin(), before.parameters.end()),
       is(after.parameters.begin(), after.parameters.end()), differs;
   std::set_symmetric_difference(was.begin(), was.end(), is.begin(), is.end(), std::inserter(differs, differs.end()));

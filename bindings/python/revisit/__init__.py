@@ -10,6 +10,7 @@ Points are arrays N x 3 or N x 4 (x forward, y left, z up, metres; raw intensity
 named last into the one named first (`T_match_query`). Messages go to `logging`, logger "revisit".
 """
 import os as _os
+import threading as _threading
 
 import numpy as _np
 
@@ -83,24 +84,37 @@ Recording.__iter__ = _iterate
 
 
 class _Stream:
-    """Numbers and stamps scans that come without."""
+    """Numbers and stamps scans that come without; one thread at a time."""
 
-    def __init__(self):
-        self._next_frame, self._last_stamp = 0, None
+    def __init__(self, next_frame=0, next_stamp=0.0):
+        self._next_frame, self._next_stamp = next_frame, next_stamp
+        self._lock = _threading.RLock()
 
-    def scan(self, points, intensity, time, ring, stamp, frame):
-        scan = Scan(points, intensity, time, ring)  # a copy: the library may change it
+    def _scan(self, points, intensity, time, ring, stamp, frame):
         if isinstance(points, Scan):
-            scan.frame, scan.stamp = points.frame, points.stamp
-        else:
-            scan.frame = self._next_frame
-            scan.stamp = 0.0 if self._last_stamp is None else self._last_stamp + 0.1
-        if frame is not None:
-            scan.frame = frame
-        if stamp is not None:
-            scan.stamp = stamp
-        self._next_frame, self._last_stamp = scan.frame + 1, scan.stamp
-        return scan
+            frame = points.frame if frame is None else frame
+            stamp = points.stamp if stamp is None else stamp
+        frame = self._next_frame if frame is None else frame
+        stamp = self._next_stamp if stamp is None else stamp
+        return Scan(points, intensity, time, ring, stamp, frame)  # a copy: the library may change it
+
+    def use(self, work, *scan):
+        """work(scan). Scans that come without number and stamp follow the last one that was taken."""
+        with self._lock:
+            scan = self._scan(*scan)
+            frame, stamp = scan.frame, scan.stamp
+            try:
+                result = work(scan)
+            except Error:  # it shows no place, but has its number
+                self._next_frame, self._next_stamp = frame + 1, stamp + 0.1
+                raise
+            self._next_frame, self._next_stamp = frame + 1, stamp + 0.1
+            return result
+
+    def look(self, work, *scan):
+        """The same of a scan that leaves nothing behind."""
+        with self._lock:
+            return work(self._scan(*scan))
 
 
 class LoopDetector:
@@ -125,11 +139,11 @@ class LoopDetector:
         stamp: seconds; without, a tenth of a second after the scan before. pose: 4 x 4, kept as evidence only.
         Raises Error where the scan describes no place; the next one may.
         """
-        return self._detector.process(self._stream.scan(points, intensity, time, ring, stamp, frame), pose)
+        return self._stream.use(lambda scan: self._detector.process(scan, pose), points, intensity, time, ring, stamp, frame)
 
     def localise(self, points, intensity=None, time=None, ring=None, *, stamp=None, frame=None):
         """Looks for the scan's place among all, and adds nothing. Gives a Detection."""
-        return self._detector.localise(self._stream.scan(points, intensity, time, ring, stamp, frame))
+        return self._stream.look(self._detector.localise, points, intensity, time, ring, stamp, frame)
 
     def __len__(self):
         """Places so far."""
@@ -204,14 +218,18 @@ class Slam:
         self._slam = _core.Slam("" if folder is None else _os.fspath(folder), _values(parameters), scale,
                                 odometry is not None, new_session)
         self._odometry, self._stream = odometry, _Stream()
-        last = self._slam.last_frame()
-        if last is not None:
-            self._stream._next_frame = last + 1
+        if self._slam.last_frame() is not None:
+            before = self._slam.trajectories()[0]
+            self._stream = _Stream(self._slam.last_frame() + 1, before["stamps"].max() + 0.1)
 
     def process(self, points, intensity=None, time=None, ring=None, *, stamp=None, frame=None, wheel_pose=None):
         """The next scan (LoopDetector.process). wheel_pose: 4 x 4, a first guess from wheels. Gives a SlamStep."""
-        scan = self._stream.scan(points, intensity, time, ring, stamp, frame)
-        return self._slam.process(scan, self._odometry(scan) if self._odometry else wheel_pose)
+        def work(scan):
+            pose = wheel_pose
+            if self._odometry:
+                pose = self._odometry(Scan(scan, stamp=scan.stamp, frame=scan.frame))  # its own: it may keep it
+            return self._slam.process(scan, pose)
+        return self._stream.use(work, points, intensity, time, ring, stamp, frame)
 
     def finish(self):
         """Decides about loops that wait, and settles the graph. More scans may follow."""
@@ -249,12 +267,12 @@ class Localiser:
 
     def locate(self, points, intensity=None, time=None, ring=None):
         """One scan without a prior: a Localisation."""
-        return self._localiser.locate(self._stream.scan(points, intensity, time, ring, None, None))
+        return self._stream.look(self._localiser.locate, points, intensity, time, ring, None, None)
 
     def follow(self, points, intensity=None, time=None, ring=None, *, stamp=None, frame=None, wheel_pose=None):
         """The next scan of a drive: found, then followed. Gives a Localisation."""
-        scan = self._stream.scan(points, intensity, time, ring, stamp, frame)
-        return self._localiser.follow(scan, wheel_pose)
+        return self._stream.use(lambda scan: self._localiser.follow(scan, wheel_pose), points, intensity, time, ring, stamp,
+                                frame)
 
     def expect(self, T_map_lidar):
         """Where the next scan is, to a few metres and 40 degrees."""
@@ -269,7 +287,7 @@ class PlaceIndex:
     """Places by their descriptors, searched in two stages (docs/retrieval.md). One thread may add while others search."""
 
     def __init__(self, parameters=None, *, _index=None):
-        self._index = _index or _PlaceIndex(_values(parameters))
+        self._index = _PlaceIndex(_values(parameters)) if _index is None else _index
 
     @classmethod
     def open(cls, path, parameters=None):

@@ -157,7 +157,7 @@ class Parameters:
     def to_dict(self) -> dict[str, dict[str, Any]]: ...
     def to_toml(self) -> str: ...
 
-class ParameterInfo:
+class _ParameterInfo:
     name: str
     help: str
     default: str
@@ -165,7 +165,7 @@ class ParameterInfo:
     max: float
     choices: str
 
-def parameter_infos() -> list[ParameterInfo]: ...
+def parameter_infos() -> list[_ParameterInfo]: ...
 
 class LoopDetector:
     def __init__(self, parameters: Parameters | None = None, *, scale: IntensityScale | None = None,

@@ -20,6 +20,9 @@ def compare(recording, out, methods=None, *, own=None, parameters=None):
     Results are left in OUT/NAME, in the form of `revisit detect`.
     """
     recording, out = os.fspath(recording), pathlib.Path(out)
+    for name in own or {}:
+        if (out / name).exists():
+            raise FileExistsError(17, "results are there already", str(out / name))
     tables = {}
     if methods is None or methods:
         chosen = ["--methods", ",".join(methods)] if methods else []
@@ -59,7 +62,7 @@ def _run_one(path, out, method, parameters):
     for scan in recording:
         descriptor = np.asarray(method.describe(scan))
         old = [i for i, (frame, stamp) in enumerate(zip(frames, stamps))
-               if scan.frame - frame >= exclude_frames and scan.stamp - stamp >= exclude_s]
+               if scan.frame - frame >= exclude_frames and scan.stamp - stamp >= exclude_s - 1e-6]
         if old:
             scores = np.asarray(method.similarity(descriptor, np.stack([descriptors[i] for i in old])), dtype=float)
             best = int(np.argmax(scores))

@@ -53,6 +53,14 @@ class Parameters:
             raise AttributeError(section)
         return _Section(self._values, section)
 
+    def __setattr__(self, section, fields):
+        if section == "_values":
+            object.__setattr__(self, section, fields)
+            return
+        target = getattr(self, section)  # AttributeError where there is none
+        for field, value in dict(fields).items():
+            setattr(target, field, value)
+
     def __dir__(self):
         return sorted({name.partition(".")[0] for name in _INFOS}) + ["copy", "to_dict", "to_toml"]
 

@@ -23,11 +23,29 @@ template <typename T>
 std::vector<T> column(const py::object& values, const char* name, std::size_t points) {
   if (values.is_none()) return {};
   const auto array = py::array_t<T, py::array::c_style | py::array::forcecast>::ensure(values);
-  if (!array) throw py::error_already_set();
+  if (!array) throw py::value_error(std::string(name) + " holds no numbers");
   if (array.ndim() != 1 || static_cast<std::size_t>(array.shape(0)) != points)
     throw py::value_error(std::string(name) + " has shape " + shape_of(array) + "; allowed: one value a point, " +
                           std::to_string(points));
   return {array.data(), array.data() + points};
+}
+
+std::vector<float> times_of(const py::object& values, std::size_t points) {
+  constexpr double kMost_s = 10.0;
+  const std::vector<double> times = column<double>(values, "time", points);
+  for (const double each : times)
+    if (!(std::abs(each) <= kMost_s))
+      throw py::value_error("time holds " + std::to_string(each) +
+                            "; allowed: seconds from the stamp, within 10 s of it");
+  return {times.begin(), times.end()};
+}
+
+std::vector<std::uint16_t> rings_of(const py::object& values, std::size_t points) {
+  const std::vector<double> rings = column<double>(values, "ring", points);
+  for (const double each : rings)
+    if (!(each >= 0.0 && each <= UINT16_MAX && each == std::floor(each)))
+      throw py::value_error("ring holds " + std::to_string(each) + "; allowed: whole numbers from 0 to 65535");
+  return {rings.begin(), rings.end()};
 }
 
 struct Columns {
@@ -111,12 +129,16 @@ std::uint8_t field_type(const py::dtype& type) {
   return 0;
 }
 
-Scan read_records(const py::array& records) {
+Scan read_records(const py::array& records, double stamp_s) {
   PointCloudView view;
   const auto fields = records.dtype().attr("fields").cast<py::dict>();
   for (const auto& [name, description] : fields) {
     const auto parts = description.cast<py::tuple>();
     const auto type = parts[0].cast<py::dtype>();
+    const bool is_number = type.kind() == 'i' || type.kind() == 'u' || type.kind() == 'f';
+    if (is_number && (field_type(type) == 0 || !type.attr("isnative").cast<bool>()))
+      throw py::value_error("field " + name.cast<std::string>() + " is " + py::str(py::object(type)).cast<std::string>() +
+                            "; allowed: 8 to 32 bit integers, float32 and float64 of this machine's byte order");
     if (const std::uint8_t number = field_type(type); number != 0)
       view.fields.push_back({name.cast<std::string>(), parts[1].cast<std::uint32_t>(), number});
   }
@@ -125,9 +147,8 @@ Scan read_records(const py::array& records) {
   view.point_step = static_cast<std::size_t>(flat.itemsize());
   view.data = {static_cast<const std::uint8_t*>(flat.data()), view.width * view.point_step};
   const LogSink log = log_sink();
-  auto scan = without_lock([&] { return revisit::to_scan(view, std::nullopt, "an array of points", log); });
+  auto scan = without_lock([&] { return revisit::to_scan(view, stamp_s, "an array of points", log); });
   if (!scan) throw py::value_error(scan.error().message);
-  scan->stamp_s = 0.0;
   return *std::move(scan);
 }
 
@@ -148,17 +169,19 @@ py::array to_array(const std::vector<LoopCandidate>& candidates) {
   return py::array_t<CandidateRecord>(static_cast<py::ssize_t>(records.size()), records.data());
 }
 
-Scan to_scan(const py::object& points, const py::object& intensity, const py::object& time, const py::object& ring) {
+Scan to_scan(const py::object& points, const py::object& intensity, const py::object& time, const py::object& ring,
+             double stamp_s) {
+  if (!std::isfinite(stamp_s)) throw py::value_error("stamp is not finite; allowed: seconds");
   const bool has_columns = !intensity.is_none() || !time.is_none() || !ring.is_none();
   if (py::isinstance<Scan>(points)) {
     if (has_columns) throw py::value_error("a Scan has its own intensities, times and rings");
     return points.cast<Scan>();
   }
   const auto array = py::array::ensure(points);
-  if (!array) throw py::error_already_set();
+  if (!array) throw py::value_error("points are no array; allowed: (N, 3) or (N, 4) of float32 or float64");
   if (array.dtype().has_fields()) {
     if (has_columns) throw py::value_error("a structured array has its own intensities, times and rings");
-    return read_records(array);
+    return read_records(array, stamp_s);
   }
   const bool is_float = array.dtype().kind() == 'f' && (array.itemsize() == 4 || array.itemsize() == 8);
   if (array.ndim() != 2 || (array.shape(1) != 3 && array.shape(1) != 4) || !is_float ||
@@ -166,12 +189,16 @@ Scan to_scan(const py::object& points, const py::object& intensity, const py::ob
     throw py::value_error("points have shape " + shape_of(array) +
                           "; allowed: (N, 3) or (N, 4) of float32 or float64, or a structured array with x, y, z");
   const auto count = static_cast<std::size_t>(array.shape(0));
-  Columns columns{column<float>(intensity, "intensity", count), column<float>(time, "time", count),
-                  column<std::uint16_t>(ring, "ring", count)};
+  Columns columns{column<float>(intensity, "intensity", count), times_of(time, count), rings_of(ring, count)};
   return read_points(array, std::move(columns));
 }
 
-Pose to_pose(const Eigen::Matrix4d& matrix) {
+Pose to_pose(const py::object& values) {
+  const auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(values);
+  if (!array) throw py::value_error("a pose holds no numbers; allowed: a 4 x 4 matrix");
+  if (array.ndim() != 2 || array.shape(0) != 4 || array.shape(1) != 4)
+    throw py::value_error("a pose has shape " + shape_of(array) + "; allowed: a 4 x 4 matrix");
+  const Eigen::Matrix4d matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(array.data());
   const Eigen::Matrix3d R = matrix.topLeftCorner<3, 3>();
   constexpr double kTolerance = 1e-3;
   const bool is_pose = matrix.allFinite() && (R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < kTolerance &&
@@ -187,8 +214,8 @@ Pose to_pose(const Eigen::Matrix4d& matrix) {
   return T;
 }
 
-std::optional<Pose> to_pose(const std::optional<Eigen::Matrix4d>& matrix) {
-  return matrix ? std::optional(to_pose(*matrix)) : std::nullopt;
+std::optional<Pose> to_optional_pose(const py::object& matrix) {
+  return matrix.is_none() ? std::nullopt : std::optional(to_pose(matrix));
 }
 
 py::array_t<double> to_array(const std::vector<Pose>& poses) {

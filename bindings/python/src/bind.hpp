@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <utility>
+#include <vector>
 
 #include <pybind11/eigen.h>
 #include <pybind11/functional.h>
@@ -40,28 +44,61 @@ inline void unwrap(const Status& status) {
   if (!status) throw OutsideError(status.error().message);
 }
 
+/// Without the interpreter's lock. A thread that is still at work when the interpreter has ended waits for the process
+/// to end, too: it could neither go on nor be unwound.
+class Unlocked {
+ public:
+  Unlocked() : state_(PyEval_SaveThread()) {}
+  Unlocked(const Unlocked&) = delete;
+  Unlocked& operator=(const Unlocked&) = delete;
+  ~Unlocked() noexcept(false) {  // Python ends threads that wait for its lock then by unwinding them
+    while (has_ended()) std::this_thread::sleep_for(std::chrono::seconds(1));
+    PyEval_RestoreThread(state_);
+  }
+  static bool has_ended() {
+#if PY_VERSION_HEX >= 0x030D0000
+    return Py_IsFinalizing() != 0;
+#else
+    return _Py_IsFinalizing() != 0;
+#endif
+  }
+
+ private:
+  PyThreadState* state_;
+};
+
 /// An object of the library that belongs to one thread at a time: calls of several threads wait for each other, without
-/// the interpreter's lock, so that Python goes on meanwhile.
+/// the interpreter's lock, so that Python goes on meanwhile. A call from one of its own callbacks is an error.
 template <typename T>
 class Shared {
  public:
   explicit Shared(T value) : value_(std::move(value)) {}
   template <typename Use>
   auto use(Use use) {
-    const py::gil_scoped_release release;
+    if (owner_ == std::this_thread::get_id()) throw std::runtime_error("called from one of its own callbacks");
+    const Unlocked unlocked;
     const std::lock_guard lock(mutex_);
+    const Owned owned(owner_);
     return use(value_);
   }
 
  private:
+  struct Owned {
+    explicit Owned(std::atomic<std::thread::id>& owner) : owner_(owner) { owner_ = std::this_thread::get_id(); }
+    Owned(const Owned&) = delete;
+    Owned& operator=(const Owned&) = delete;
+    ~Owned() { owner_ = std::thread::id(); }
+    std::atomic<std::thread::id>& owner_;
+  };
   std::mutex mutex_;
+  std::atomic<std::thread::id> owner_;
   T value_;
 };
 
 /// Runs it without the interpreter's lock.
 template <typename Work>
 auto without_lock(Work work) {
-  const py::gil_scoped_release release;
+  const Unlocked unlocked;
   return work();
 }
 
@@ -82,10 +119,12 @@ class PythonProgress {
 /// A scan from an array of points: N x 3 or N x 4 of float32 or float64 in any memory order, or structured with named
 /// fields as ROS has them. Others, and `intensity`, `time`, `ring` of other lengths, are ValueError. Points that are
 /// not finite or (0,0,0) are left out. A Scan is taken as it is.
-Scan to_scan(const py::object& points, const py::object& intensity, const py::object& time, const py::object& ring);
+Scan to_scan(const py::object& points, const py::object& intensity, const py::object& time, const py::object& ring,
+             double stamp_s);
 /// 4 x 4, or ValueError.
-Pose to_pose(const Eigen::Matrix4d& matrix);
-std::optional<Pose> to_pose(const std::optional<Eigen::Matrix4d>& matrix);
+Pose to_pose(const py::object& matrix);
+/// Nothing of None.
+std::optional<Pose> to_optional_pose(const py::object& matrix);
 /// N x 4 x 4.
 py::array_t<double> to_array(const std::vector<Pose>& poses);
 /// N x 4, float32.

@@ -61,8 +61,8 @@ void bind_detection(py::module_& module) {
            }),
            py::arg("parameters"), py::arg("scale"))
       .def("process",
-           [](Detector& self, Scan& scan, const std::optional<Eigen::Matrix4d>& pose) {
-             const auto T = to_pose(pose);
+           [](Detector& self, Scan& scan, const py::object& pose) {
+             const auto T = to_optional_pose(pose);
              return unwrap(self.use([&](LoopDetector& detector) { return detector.process(std::move(scan), T); }));
            })
       .def("localise",

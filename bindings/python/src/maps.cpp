@@ -53,8 +53,8 @@ void bind_slam(py::module_& module) {
   py::class_<SharedSlam>(module, "Slam")
       .def(py::init(&make_slam))
       .def("process",
-           [](SharedSlam& self, Scan& scan, const std::optional<Eigen::Matrix4d>& odometry) {
-             const auto T = to_pose(odometry);
+           [](SharedSlam& self, Scan& scan, const py::object& odometry) {
+             const auto T = to_optional_pose(odometry);
              return unwrap(self.use([&](Slam& slam) { return slam.process(std::move(scan), T); }));
            })
       .def("finish", [](SharedSlam& self) { unwrap(self.use([](Slam& slam) { return slam.finish(); })); })
@@ -115,12 +115,12 @@ void bind_maps(py::module_& module) {
              return unwrap(self.use([&](Localiser& localiser) { return localiser.locate(std::move(scan)); }));
            })
       .def("follow",
-           [](SharedLocaliser& self, Scan& scan, const std::optional<Eigen::Matrix4d>& odometry) {
-             const auto T = to_pose(odometry);
+           [](SharedLocaliser& self, Scan& scan, const py::object& odometry) {
+             const auto T = to_optional_pose(odometry);
              return unwrap(self.use([&](Localiser& localiser) { return localiser.follow(std::move(scan), T); }));
            })
       .def("expect",
-           [](SharedLocaliser& self, const Eigen::Matrix4d& T_map_lidar) {
+           [](SharedLocaliser& self, const py::object& T_map_lidar) {
              const Pose T = to_pose(T_map_lidar);
              self.use([&](Localiser& localiser) { localiser.expect(T); });
            })

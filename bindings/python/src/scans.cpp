@@ -39,7 +39,7 @@ void bind_scans(py::module_& module) {
   py::class_<Scan, std::shared_ptr<Scan>>(module, "Scan", "One sweep of a LiDAR.")
       .def(py::init([](const py::object& points, const py::object& intensity, const py::object& time,
                        const py::object& ring, double stamp, std::int64_t frame) {
-             Scan scan = to_scan(points, intensity, time, ring);
+             Scan scan = to_scan(points, intensity, time, ring, stamp);
              scan.stamp_s = stamp;
              scan.frame = FrameId{frame};
              return scan;
@@ -83,7 +83,11 @@ void bind_scans(py::module_& module) {
              return unwrap(without_lock([&] { return self.read(i); }));
            })
       .def("frame", [](const Recording& self, py::ssize_t i) { return self.frame(index_in(self, i)).value; })
-      .def("stamp", [](const Recording& self, py::ssize_t i) { return self.stamp_s(index_in(self, i)); })
+      .def("stamp",
+           [](const Recording& self, py::ssize_t i) {
+             const std::size_t index = index_in(self, i);
+             return without_lock([&] { return self.stamp_s(index); });
+           })
       .def(
           "pose",
           [](const Recording& self, py::ssize_t i) -> std::optional<Eigen::Matrix4d> {
@@ -94,16 +98,20 @@ void bind_scans(py::module_& module) {
       .def(
           "wheel_pose",
           [](const Recording& self, py::ssize_t i) -> std::optional<Eigen::Matrix4d> {
-            const auto T = self.wheel_pose(index_in(self, i));
+            const std::size_t index = index_in(self, i);
+            const auto T = without_lock([&] { return self.wheel_pose(index); });
             return T ? std::optional(T->matrix()) : std::nullopt;
           },
           "What the wheels or another odometry said, 4 x 4, in a frame of their own; None where there is none.")
       .def_property_readonly("kind", &Recording::kind)
       .def_property_readonly("has_times", &Recording::has_times)
-      .def_property_readonly("findings", &Recording::findings);
+      .def_property_readonly("findings",
+                             [](const Recording& self) { return without_lock([&] { return self.findings(); }); });
 
   py::class_<IntensityScale>(module, "IntensityScale", "How the raw intensity of one sensor becomes [0, 1].")
       .def(py::init([](double full_scale) {
+             if (!(full_scale > 0.0 && std::isfinite(full_scale)))
+               throw py::value_error("full_scale is " + std::to_string(full_scale) + "; allowed: above 0, finite");
              IntensityScale scale;
              scale.full_scale = full_scale;
              return scale;

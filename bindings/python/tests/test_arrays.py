@@ -58,6 +58,27 @@ def test_others_are_refused(points, says):
         revisit.Scan(points)
 
 
+def test_what_columns_may_hold():
+    for named in ({"ring": [-1, 0, 1]}, {"ring": [0, 1.5, 2]}, {"ring": [0, np.nan, 2]}, {"time": [0, 1e9, 0]},
+                  {"intensity": ["a", "b", "c"]}, {"stamp": np.nan}):
+        with pytest.raises(ValueError):
+            revisit.Scan(XYZI, **named)
+    for dtype in ([("x", ">f4"), ("y", ">f4"), ("z", ">f4")], [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", "i8")]):
+        with pytest.raises(ValueError, match="field"):
+            revisit.Scan(np.ones(3, dtype=dtype))
+    with pytest.raises(ValueError):
+        revisit.Scan([[1, 2, 3], [1, 2]])
+    for full_scale in (0, -1, np.nan):
+        with pytest.raises(ValueError):
+            revisit.IntensityScale(full_scale)
+
+
+def test_times_count_from_the_stamp():
+    records = np.ones(3, dtype=[("x", "f4"), ("y", "f4"), ("z", "f4"), ("timestamp", "f8")])
+    records["timestamp"] = 100.0 + np.array([-0.05, 0.0, 0.04])
+    np.testing.assert_allclose(revisit.Scan(records, stamp=100.0).times, [-0.05, 0.0, 0.04], atol=1e-6)
+
+
 def test_columns_of_another_length_are_refused():
     with pytest.raises(ValueError, match=r"intensity has shape \(2\).*one value a point, 3"):
         revisit.Scan(XYZI, intensity=[1, 2])

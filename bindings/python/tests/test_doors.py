@@ -60,8 +60,59 @@ def test_what_describes_no_place_is_an_error_and_the_next_scan_works(scans):
     with pytest.raises(revisit.Error, match="frame 0"):
         detector.process(np.ones((5, 3)))
     assert detector.process(scans[0]).frame == 0
-    with pytest.raises(ValueError, match="a pose is"):
-        detector.process(scans[1], pose=np.full((4, 4), np.nan))
+    for pose in (np.full((4, 4), np.nan), np.eye(3), np.eye(4)[:3], "here"):
+        with pytest.raises(ValueError, match="a pose"):
+            detector.process(scans[1], pose=pose)
+
+
+def test_a_frame_that_does_not_increase_is_refused_and_changes_nothing(scans, short_past):
+    detector = revisit.LoopDetector(short_past)
+    for scan in scans[:75]:
+        detector.process(scan)
+    for frame in range(60):
+        with pytest.raises(ValueError, match="increasing"):
+            detector.process(scans[75], frame=frame)
+    undisturbed = revisit.LoopDetector(short_past)
+    for scan in scans[:75]:
+        undisturbed.process(scan)
+    for scan in scans[75:110]:
+        ours, theirs = detector.process(scan).loop, undisturbed.process(scan).loop
+        assert (ours.match if ours else None) == (theirs.match if theirs else None)
+
+
+def test_scans_without_numbers_follow_those_that_were_taken(scans):
+    detector = revisit.LoopDetector()
+    assert [detector.process(scan.points).frame for scan in scans[:3]] == [0, 1, 2]
+    detector.localise(scans[0])
+    with pytest.raises(ValueError):
+        detector.process(scans[4].points, frame=1)
+    with pytest.raises(revisit.Error):
+        detector.process(np.ones((5, 3)))
+    assert detector.process(scans[4].points).frame == 4
+
+
+def test_a_call_from_its_own_callback_is_an_error(scans, tmp_path):
+    slam = revisit.Slam()
+    for scan in scans[:10]:
+        slam.process(scan)
+    with pytest.raises(RuntimeError, match="its own callback"):
+        slam.write_map(tmp_path, lambda done: slam.trajectory())
+
+
+def test_a_thread_at_work_does_not_spoil_the_end():
+    done = subprocess.run([sys.executable, "-c", """
+import threading, time, numpy as np, revisit
+points = np.random.default_rng(1).uniform(-20, 20, (100000, 3))
+def work():
+    while True:
+        try:
+            revisit.describe(points)
+        except revisit.Error:
+            pass
+threading.Thread(target=work, daemon=True).start()
+time.sleep(0.5)
+"""], env=os.environ, timeout=60)
+    assert done.returncode == 0
 
 
 def test_two_scans_are_registered(drive, scans):
@@ -92,9 +143,16 @@ def test_a_map_is_made_and_woken_up_in(drive, scans, tmp_path):
 
 
 def test_an_odometry_of_ones_own(drive, scans):
-    slam = revisit.Slam(odometry=lambda scan: drive.pose(scan.frame))
+    kept = []
+
+    def odometry(scan):
+        kept.append(scan.points)
+        return drive.pose(scan.frame)
+
+    slam = revisit.Slam(odometry=odometry)
     for scan in scans[:20]:
         slam.process(scan)
+    np.testing.assert_array_equal(kept[7], scans[7].points)
     truth = np.linalg.inv(drive.pose(0)) @ drive.pose(19)
     np.testing.assert_allclose(slam.trajectory().poses[-1], truth, atol=1e-6)
 

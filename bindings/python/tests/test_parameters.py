@@ -28,6 +28,10 @@ def test_files_are_those_of_the_program(tmp_path):
     parameters = revisit.Parameters(geometric={"features": "fallback"}, slam={"map_voxel_m": 0.5})
     (tmp_path / "p.toml").write_text(parameters.to_toml())
     assert revisit.Parameters(file=tmp_path / "p.toml") == parameters
+    parameters.retrieval = {"top_k": 9}
+    assert parameters.retrieval.top_k == 9
+    with pytest.raises(AttributeError):
+        parameters.topk = 3
     with pytest.raises(AttributeError):
         parameters.nothing
     with pytest.raises(AttributeError):

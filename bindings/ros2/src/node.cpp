@@ -229,11 +229,17 @@ class RevisitNode final : public rclcpp_lifecycle::LifecycleNode, public node::O
   rcl_interfaces::msg::SetParametersResult change(const std::vector<rclcpp::Parameter>& parameters) {
     rcl_interfaces::msg::SetParametersResult result;
     node::Settings settings;
+    result.successful = true;
+    if (!node_) return result;
     result.successful = read_settings(settings, result.reason);
     for (const rclcpp::Parameter& each : parameters)  // others are ROS's own
       if (result.successful && node::is_setting(each.get_name()))
         result.successful = node::set(settings, each.get_name(), each.value_to_string(), result.reason);
-    if (result.successful && node_) result.successful = node_->change(settings, result.reason);
+    for (const auto& each : node::parameters())  // as read_settings() leaves them out
+      if (const auto found = settings.parameters.find(each.name);
+          found != settings.parameters.end() && found->second == each.value)
+        settings.parameters.erase(found);
+    if (result.successful) result.successful = node_->change(settings, result.reason);
     return result;
   }
   template <typename Message, typename Use>

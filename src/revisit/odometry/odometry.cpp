@@ -14,6 +14,7 @@ struct Following {
   static constexpr double kTypicalPeriod_s = 0.1;  ///< where stamps do not increase
   /// Prediction error beyond which a sweep was compensated wrongly, and is once more with the motion that was found.
   static constexpr double kWrong_m = 0.1;
+  static constexpr double kFastest_mps = 50.0;  ///< that a sensor moves while nobody listens
 };
 
 }  // namespace
@@ -21,11 +22,15 @@ struct Following {
 OdometryStep Odometry::follow(const Scan& scan, const std::optional<Pose>& T_external_lidar) {
   const bool is_late = !has_last_ || scan.stamp_s > last_stamp_s_;
   const double stamp_s = is_late ? scan.stamp_s : last_stamp_s_ + Following::kTypicalPeriod_s;
-  const auto T_previous_lidar = motion_by_external(T_external_lidar);
+  auto T_previous_lidar = motion_by_external(T_external_lidar);
+  const bool is_guess = std::exchange(is_external_restored_, is_external_restored_ && !T_external_lidar);
+  if (is_guess && T_previous_lidar &&
+      T_previous_lidar->translation().norm() > Following::kFastest_mps * (stamp_s - last_stamp_s_))
+    T_previous_lidar.reset();
   const bool follows_closely = follows(stamp_s);
   imu_.add(scan);
-  OdometryStep step =
-      source_ == Source::kExternal ? take(scan, stamp_s, T_previous_lidar) : match(scan, stamp_s, T_previous_lidar);
+  OdometryStep step = source_ == Source::kExternal ? take(scan, stamp_s, T_previous_lidar)
+                                                   : match(scan, stamp_s, T_previous_lidar, is_guess);
   step.stamp_s = stamp_s;
   step.up = imu_.up();
   step.stamp_was_replaced = !is_late;
@@ -47,7 +52,7 @@ OdometryStep Odometry::follow(const Scan& scan, const std::optional<Pose>& T_ext
   has_last_ = true;
   last_stamp_s_ = stamp_s;
   T_odom_last_ = step.T_odom_lidar;
-  if (T_external_lidar) restore_external(*T_external_lidar);
+  if (T_external_lidar) set_external(*T_external_lidar);
   return step;
 }
 
@@ -71,7 +76,8 @@ OdometryStep Odometry::take(const Scan& scan, double stamp_s, const std::optiona
   return step;
 }
 
-OdometryStep Odometry::match(const Scan& scan, double stamp_s, const std::optional<Pose>& T_previous_lidar) {
+OdometryStep Odometry::match(const Scan& scan, double stamp_s, const std::optional<Pose>& T_previous_lidar,
+                             bool is_guess) {
   const bool is_swept = !scan.times_s.empty() && follows(stamp_s);
   OdometryStep step;
   step.motion = T_previous_lidar && follows(stamp_s) ? twist_of(*T_previous_lidar, stamp_s - last_stamp_s_)
@@ -82,8 +88,8 @@ OdometryStep Odometry::match(const Scan& scan, double stamp_s, const std::option
     if (first_scan_) begin_map_again(*step.motion);
   }
   MatcherScan thinned = matcher_.thinned(step.compensated.empty() ? scan.points : step.compensated);
-  ScanMatch match =
-      matcher_.match(stamp_s, thinned, T_previous_lidar ? T_previous_lidar : motion_by_imu(stamp_s), !T_previous_lidar);
+  ScanMatch match = matcher_.match(stamp_s, thinned, T_previous_lidar ? T_previous_lidar : motion_by_imu(stamp_s),
+                                   !T_previous_lidar || is_guess);
   if (is_swept && match.prediction_error_m > Following::kWrong_m) {
     const Twist found = with_imu(twist_of(match.T_previous_found, stamp_s - last_stamp_s_));
     std::vector<Point> again = compensated(scan, found);
@@ -145,6 +151,11 @@ void Odometry::restore(double stamp_s, const Pose& T_odom_lidar, const std::opti
 }
 
 void Odometry::restore_external(const Pose& T_external_lidar) {
+  set_external(T_external_lidar);
+  is_external_restored_ = true;
+}
+
+void Odometry::set_external(const Pose& T_external_lidar) {
   T_external_last_ = T_external_lidar;
   T_odom_at_external_ = T_odom_last_;
 }

@@ -55,11 +55,13 @@ class Odometry {
   void restore(double stamp_s, const Pose& T_odom_lidar, const std::optional<Twist>& motion, int segment);
   /// Segments count from here, before the first scan.
   void begin_at_segment(int segment) { segment_ = segment; }
-  /// What the external odometry said at that last scan.
+  /// What the external odometry said at that last scan. It may have begun anew since: what it says of the time between
+  /// is a first guess, and none where nothing could have moved so far.
   void restore_external(const Pose& T_external_lidar);
 
  private:
-  OdometryStep match(const Scan& scan, double stamp_s, const std::optional<Pose>& T_previous_lidar);
+  OdometryStep match(const Scan& scan, double stamp_s, const std::optional<Pose>& T_previous_lidar, bool is_guess);
+  void set_external(const Pose& T_external_lidar);
   OdometryStep take(const Scan& scan, double stamp_s, const std::optional<Pose>& T_previous_lidar) const;
   std::optional<Pose> motion_by_external(const std::optional<Pose>& T_external_lidar) const;
   bool follows(double stamp_s) const;
@@ -75,6 +77,7 @@ class Odometry {
   bool has_last_ = false;
   double last_stamp_s_ = 0.0;
   Pose T_odom_last_ = Pose::Identity();
+  bool is_external_restored_ = false;           ///< until the next scan that comes with one
   std::optional<Pose> T_external_last_;         ///< of the last scan that came with one
   Pose T_odom_at_external_ = Pose::Identity();  ///< ours at that scan
   std::optional<Scan> first_scan_;              ///< of a segment, as it was swept, until the motion is known

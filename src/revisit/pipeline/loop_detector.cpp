@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/pipeline/loop_detector.hpp>
 
+#include <stdexcept>
 #include <utility>
 
 #include <revisit/core/stopwatch.hpp>
+#include <revisit/core/text.hpp>
 #include <revisit/preprocess/range_filter.hpp>
 
 namespace revisit {
@@ -49,6 +51,9 @@ Result<Detection> LoopDetector::localise(Scan scan) {
 }
 
 Result<LoopDetector::Prepared> LoopDetector::follow_and_prepare(Scan scan) {
+  if (const std::size_t places = index().size(); places > 0 && scan.frame <= index().frame(places - 1))
+    throw std::invalid_argument(to_text(scan.frame) + " after " + to_text(index().frame(places - 1)) +
+                                "; allowed: increasing frames");
   Stopwatch watch;
   filter_range(scan, parameters_.preprocess);
   const OdometryStep step = odometry_.follow(scan);
