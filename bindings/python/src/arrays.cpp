@@ -137,7 +137,8 @@ Scan read_records(const py::array& records, double stamp_s) {
     const auto type = parts[0].cast<py::dtype>();
     const bool is_number = type.kind() == 'i' || type.kind() == 'u' || type.kind() == 'f';
     if (is_number && (field_type(type) == 0 || !type.attr("isnative").cast<bool>()))
-      throw py::value_error("field " + name.cast<std::string>() + " is " + py::str(py::object(type)).cast<std::string>() +
+      throw py::value_error("field " + name.cast<std::string>() + " is " +
+                            py::str(py::object(type)).cast<std::string>() +
                             "; allowed: 8 to 32 bit integers, float32 and float64 of this machine's byte order");
     if (const std::uint8_t number = field_type(type); number != 0)
       view.fields.push_back({name.cast<std::string>(), parts[1].cast<std::uint32_t>(), number});
