@@ -43,8 +43,6 @@ struct Matching {
   // The first scans of a sparse sensor meet few surfaces; those that they meet must fit.
   static constexpr int kFirstScans = 5;
   static constexpr double kFewestMatchedAtFirst = 0.1, kFittingAtFirst = 0.6;
-  // Where a door opens, hardly anything in sight was seen before. What is left must fit where wheels say that it is.
-  static constexpr double kAsMeasured_m = 0.1, kAsMeasured_deg = 1.0;
 
   static constexpr double kLongestGap_s = 1.0;  ///< beyond, the motion before says nothing about the motion now
   static constexpr double kLongestExtrapolation_s = 5.0;  ///< and is still a better guess than none
@@ -75,8 +73,6 @@ double slid_m(const Matrix6& information, const Eigen::Vector3d& step) {
       (axes.eigenvalues().array() < Matching::kHardlyFixed * axes.eigenvalues().sum()).cast<double>();
   return (is_free * along.array()).matrix().norm();
 }
-
-bool follows(double gap_s) { return gap_s > 0.0 && gap_s <= Matching::kLongestGap_s; }
 
 }  // namespace
 
@@ -183,22 +179,16 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
   const auto fits = [&](const IcpResult& icp) {
     return icp.converged && is_credible(icp.matched, icp.met) && is_possible(icp);
   };
-  const auto is_as_measured = [&](const IcpResult& icp) {
-    const Pose error = (T_odom_lidar_ * T_predicted).inverse() * icp.T_target_source;
-    return measured_m && follows(gap_s) && icp.converged && icp.matched >= Matching::kFittingAtFirst * icp.met &&
-           error.translation().norm() < Matching::kAsMeasured_m &&
-           rotation_angle(error) < to_radians(Matching::kAsMeasured_deg);
-  };
   IcpResult icp = align(radius_m, T_predicted);
   if (!is_possible(icp)) icp = align(std::min(radius_m, Matching::kNarrowSearch_m), T_predicted);
   // A turn or a jolt that was not predicted, or the end of one. After a gap anything may fit somehow: nothing is tried.
   // With a few of the points; where these fit better, all are aligned.
-  const bool is_confirmed = !fits(icp) && is_as_measured(icp);
+  const bool follows = gap_s > 0.0 && gap_s <= Matching::kLongestGap_s;
   std::vector<Eigen::Vector3f> few;
   double best_of_few = 0.0;
   for (const double turn_deg : Matching::kTurnsTried_deg)
     for (const Pose& T_guess : {T_predicted, Pose(Pose::Identity())}) {
-      if (fits(icp) || is_confirmed || (turn_deg != 0.0 && !follows(gap_s))) break;
+      if (fits(icp) || (turn_deg != 0.0 && !follows)) break;
       if (few.empty())
         for (std::size_t i = 0; i < scan.points.size(); i += 1 + scan.points.size() / (2 * Matching::kFew))
           few.push_back(scan.points[i]);
@@ -211,9 +201,7 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
     }
   match.matched = icp.matched;
   match.met = icp.met;
-  match.is_tracked = fits(icp) || is_confirmed;
-  // Of so little, wheels know better.
-  if (is_confirmed && icp.matched < Matching::kFewestMatched) icp.T_target_source = T_odom_lidar_ * T_predicted;
+  match.is_tracked = fits(icp);
   match.T_previous_found = T_odom_lidar_.inverse() * icp.T_target_source;
   const Pose error = T_predicted.inverse() * match.T_previous_found;
   match.prediction_error_m = error.translation().norm() + rotation_angle(error) * range_m_;
