@@ -182,8 +182,8 @@ OverheadSearch::At OverheadSearch::climb(const OverheadImage& place_grown, const
 
 // Images are grown by a cell, so that every other heading and cell shows where to look closely.
 void OverheadSearch::try_headings(const OverheadImage& place_grown, int first_step, int last_step, int reach_cells) {
-  const auto side = static_cast<std::size_t>(2 * reach_cells / Coarse::kCells + 1);
-  const auto headings = static_cast<std::size_t>((last_step - first_step) / Coarse::kSteps + 1);
+  const auto side = 2 * static_cast<std::size_t>(reach_cells) / Coarse::kCells + 1;
+  const auto headings = static_cast<std::size_t>(last_step - first_step) / Coarse::kSteps + 1;
   coarse_.resize(headings * side * side);
   // Steps that are a whole turn apart share their images: only one of the two is tried beside others.
   const auto one_heading = [&](std::size_t heading) {
