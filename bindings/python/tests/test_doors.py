@@ -209,7 +209,7 @@ def test_threads_work_side_by_side_and_agree(scans, short_past):
         for i, scan in enumerate(scans[:30]):
             try:
                 shared.process(scan, frame=1000 * number + i)
-            except ValueError:  # another thread was faster: frames increase
+            except (ValueError, revisit.Error):  # another thread was faster: frames increase, stamps jump
                 pass
             if number == 0:
                 index.add(i, descriptors[i])
