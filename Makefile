@@ -71,6 +71,7 @@ SOURCES = $(shell git ls-files '*.cpp' '*.hpp' '*.h')
 lint: packages
 	@scripts/install_packages.sh clang-format clang-tidy
 	@cmake --preset debug --log-level=NOTICE > /dev/null
+	@cmake --build --preset debug --target generated_sources > /dev/null
 	@clang-format --dry-run --Werror $(SOURCES)
 	python3 scripts/check_layers.py
 	@scripts/tidy.sh $(JOBS)
