@@ -109,7 +109,10 @@ struct Graph {
 /// The map's points: x y z intensity.
 struct MapCloud {
   std::string map_frame;
-  std::vector<float> points;
+  std::vector<float> overview;                               ///< at most kOverviewPoints, spread evenly over the map
+  std::vector<std::vector<float>> tiles;                     ///< all points, by squares of kTileM on the ground plane
+  static constexpr std::size_t kOverviewPoints = 2'000'000;  // one message of 32 MB
+  static constexpr double kTileM = 50.0;
 };
 
 /// nav_msgs/OccupancyGrid: what may be driven over.

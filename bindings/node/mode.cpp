@@ -1,6 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mode.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+#include <vector>
+
 #include <Eigen/LU>
 
 namespace revisit::node {
@@ -60,9 +66,17 @@ Result<MapGrid> to_map_grid(const Settings& settings, const Result<OccupancyGrid
 }
 
 MapCloud to_map_cloud(const Settings& settings, const std::vector<Point>& points) {
-  MapCloud cloud{settings.map_frame, {}};
-  cloud.points.reserve(4 * points.size());
-  for (const Point& p : points) cloud.points.insert(cloud.points.end(), {p.x, p.y, p.z, p.intensity});
+  const auto add = [](std::vector<float>& to, const Point& p) { to.insert(to.end(), {p.x, p.y, p.z, p.intensity}); };
+  MapCloud cloud{settings.map_frame, {}, {}};
+  const std::size_t step =
+      std::max<std::size_t>(1, (points.size() + MapCloud::kOverviewPoints - 1) / MapCloud::kOverviewPoints);
+  cloud.overview.reserve(4 * (points.size() / step + 1));
+  for (std::size_t i = 0; i < points.size(); i += step) add(cloud.overview, points[i]);
+  std::map<std::pair<int, int>, std::vector<float>> tiles;
+  const auto tile = [](float metres) { return static_cast<int>(std::floor(metres / MapCloud::kTileM)); };
+  for (const Point& p : points) add(tiles[{tile(p.x), tile(p.y)}], p);
+  cloud.tiles.reserve(tiles.size());
+  for (auto& [where, inside] : tiles) cloud.tiles.push_back(std::move(inside));
   return cloud;
 }
 

@@ -2,10 +2,12 @@
 #include "node.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <map>
 #include <mutex>
+#include <set>
 #include <sstream>
 #include <thread>
 
@@ -256,7 +258,22 @@ TEST(Node, LocaliseAnswersFromASavedMap) {
   const auto node = Node::make(settings, listener, message);
   ASSERT_TRUE(node) << message;
   EXPECT_TRUE(node->publish_map(message)) << message;
-  EXPECT_GT(listener.clouds.at(0).points.size(), 4000u);
+  const MapCloud& cloud = listener.clouds.at(0);
+  EXPECT_GT(cloud.overview.size(), 4000u);
+  // All points are in the tiles, each in one square.
+  std::size_t in_tiles = 0;
+  std::set<std::pair<int, int>> squares;
+  for (const std::vector<float>& tile : cloud.tiles) {
+    in_tiles += tile.size();
+    const auto square = [&](std::size_t i) {
+      return std::pair(static_cast<int>(std::floor(tile[i] / MapCloud::kTileM)),
+                       static_cast<int>(std::floor(tile[i + 1] / MapCloud::kTileM)));
+    };
+    EXPECT_TRUE(squares.insert(square(0)).second);
+    for (std::size_t i = 0; i < tile.size(); i += 4) ASSERT_EQ(square(i), square(0));
+  }
+  EXPECT_EQ(in_tiles, cloud.overview.size());
+  EXPECT_GT(squares.size(), 1u);
   EXPECT_FALSE(node->save_map("", message)) << "nothing to save";
 }
 
@@ -272,7 +289,7 @@ TEST(Node, ServicesWorkBesideScans) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   ASSERT_GE(listener.count_of_poses(), 10u);
   EXPECT_TRUE(node->publish_map(message)) << message;
-  EXPECT_FALSE(listener.clouds.at(0).points.empty());
+  EXPECT_FALSE(listener.clouds.at(0).overview.empty());
   MapGrid grid;
   EXPECT_TRUE(node->get_map(grid, message)) << message;
   ASSERT_EQ(grid.cells.size(), std::size_t{grid.width} * grid.height);

@@ -100,9 +100,10 @@ struct Messages {
     return markers;
   }
 
-  static typename Ros::PointCloud2 cloud(const MapCloud& points, std::int64_t stamp_ns) {
+  static typename Ros::PointCloud2 cloud(const std::string& frame, const std::vector<float>& points,
+                                         std::int64_t stamp_ns) {
     typename Ros::PointCloud2 message;
-    message.header = header(points.map_frame, stamp_ns);
+    message.header = header(frame, stamp_ns);
     const std::array<const char*, 4> names{"x", "y", "z", "intensity"};
     for (std::size_t i = 0; i < names.size(); ++i) {
       typename Ros::PointField field;
@@ -111,12 +112,12 @@ struct Messages {
       message.fields.push_back(field);
     }
     message.height = 1;
-    message.width = static_cast<std::uint32_t>(points.points.size() / names.size());
+    message.width = static_cast<std::uint32_t>(points.size() / names.size());
     message.point_step = names.size() * sizeof(float);
     message.row_step = message.point_step * message.width;
     message.is_dense = true;
     message.data.resize(message.row_step);
-    if (!points.points.empty()) std::memcpy(message.data.data(), points.points.data(), message.data.size());
+    if (!points.empty()) std::memcpy(message.data.data(), points.data(), message.data.size());
     return message;
   }
   static typename Ros::OccupancyGrid grid(MapGrid cells, std::int64_t stamp_ns) {

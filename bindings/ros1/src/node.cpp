@@ -64,7 +64,7 @@ using Messages = node::Messages<Ros1>;
 
 class Outlet final : public node::Outlet {
  public:
-  explicit Outlet(ros::NodeHandle& handle) : listener_(buffer_) {
+  explicit Outlet(ros::NodeHandle& handle) : listener_(buffer_), handle_(handle) {
     loops_ = handle.advertise<Ros1::Loop>("loops", 100);
     loop_poses_ = handle.advertise<Ros1::StampedPose>("loop_poses", 100);
     pose_ = handle.advertise<Ros1::StampedPose>("pose", 10);
@@ -84,7 +84,16 @@ class Outlet final : public node::Outlet {
     path_.publish(Messages::path(graph));
     graph_.publish(Messages::loops(graph));
   }
-  void send(const node::MapCloud& cloud) override { map_.publish(Messages::cloud(cloud, Ros1::now_ns())); }
+  void send(const node::MapCloud& cloud) override {
+    const std::int64_t now_ns = Ros1::now_ns();
+    map_.publish(Messages::cloud(cloud.map_frame, cloud.overview, now_ns));
+    // A publisher keeps its last message for those that come later: one a tile, and no limit to what they send at once.
+    tiles_.resize(cloud.tiles.size());
+    for (std::size_t i = 0; i < tiles_.size(); ++i) {
+      if (!tiles_[i]) tiles_[i] = handle_.advertise<Ros1::PointCloud2>("map_tiles", 0, true);
+      tiles_[i].publish(Messages::cloud(cloud.map_frame, cloud.tiles[i], now_ns));
+    }
+  }
   void send(const node::Health& health) override {
     diagnostics_.publish(Messages::health(health, ros::this_node::getName(), Ros1::now_ns()));
   }
@@ -106,7 +115,9 @@ class Outlet final : public node::Outlet {
   tf2_ros::Buffer buffer_;
   tf2_ros::TransformListener listener_;
   tf2_ros::TransformBroadcaster broadcaster_;
+  ros::NodeHandle handle_;
   ros::Publisher loops_, loop_poses_, pose_, path_, graph_, map_, diagnostics_;
+  std::vector<ros::Publisher> tiles_;
 };
 
 // Whatever message with a scan a driver sends, as it came over the wire: its package need not be installed.

@@ -220,6 +220,17 @@ class NodeTest(unittest.TestCase):
         cloud = node.last("/revisit/map_cloud")
         self.assertGreater(cloud.width, 10000)
         self.assertEqual(cloud.header.frame_id, "map")
+        # Whoever comes late gets all tiles of the last publish, not only the last one.
+        answer = node.call("publish_map")
+        self.assertTrue(answer.success, answer.message)
+        tiles = []
+        late = rospy.Subscriber("/revisit/map_tiles", PointCloud2, tiles.append)
+        wait_until(lambda: sum(tile.width for tile in tiles) >= cloud.width)
+        time.sleep(0.5)
+        self.assertEqual(sum(tile.width for tile in tiles), cloud.width)
+        self.assertEqual(len({tile.header.stamp.to_nsec() for tile in tiles}), 1)
+        self.assertGreater(len(tiles), 1)
+        late.unregister()
         grid = rospy.ServiceProxy("/revisit/get_map", GetMap)().map
         self.assertEqual(grid.header.frame_id, "map")
         self.assertEqual(len(grid.data), grid.info.width * grid.info.height)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dds_outlet.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <iostream>
 #include <thread>
@@ -66,6 +67,7 @@ DdsOutlet::DdsOutlet(dds_entity_t participant, const std::string& name)
       loop_poses_(participant, name + "/loop_poses", Quality::kReliable),
       pose_(participant, name + "/pose", Quality::kReliable),
       path_(participant, name + "/path", Quality::kLatched),
+      participant_(participant),
       map_(participant, name + "/map_cloud", Quality::kLatched),
       tf_(participant, "/tf", Quality::kReliable),
       diagnostics_(participant, "/diagnostics", Quality::kReliable),
@@ -121,14 +123,22 @@ void DdsOutlet::send(const node::MapCloud& cloud) {
   PointCloud2 message{};
   message.header = header_of(now_ns(), cloud.map_frame);
   message.height = 1;
-  message.width = static_cast<std::uint32_t>(cloud.points.size() / 4);
   message.fields = sequence_of<decltype(message.fields)>(fields);
   message.point_step = 16;
-  message.row_step = 16 * message.width;
-  message.data._length = message.data._maximum = message.row_step;
-  message.data._buffer = reinterpret_cast<std::uint8_t*>(const_cast<float*>(cloud.points.data()));
   message.is_dense = true;
-  map_.write(message);
+  const auto write = [&](const Writer<PointCloud2>& writer, const std::vector<float>& points) {
+    message.width = static_cast<std::uint32_t>(points.size() / 4);
+    message.row_step = 16 * message.width;
+    message.data._length = message.data._maximum = message.row_step;
+    message.data._buffer = reinterpret_cast<std::uint8_t*>(const_cast<float*>(points.data()));
+    writer.write(message);
+  };
+  write(map_, cloud.overview);
+  // A new writer, which keeps as many messages for those that come later as there are tiles.
+  tiles_.reset();
+  tiles_ = std::make_unique<Writer<PointCloud2>>(participant_, name_ + "/map_tiles", Quality::kLatched,
+                                                 static_cast<int>(std::max<std::size_t>(1, cloud.tiles.size())));
+  for (const std::vector<float>& tile : cloud.tiles) write(*tiles_, tile);
 }
 
 void DdsOutlet::send(const node::Health& health) {

@@ -41,7 +41,9 @@ class DdsOutlet final : public node::Outlet {
   Writer<LoopMessage> loops_;
   Writer<PoseWithCovarianceStamped> loop_poses_, pose_;
   Writer<PathMessage> path_;
+  const dds_entity_t participant_;
   Writer<PointCloud2> map_;
+  std::unique_ptr<Writer<PointCloud2>> tiles_;
   Writer<TfMessage> tf_;
   Writer<DiagnosticArray> diagnostics_;
   Reader<TfMessage> tf_static_;

@@ -46,10 +46,12 @@ inline dds_entity_t require(dds_entity_t entity, const std::string& what) {
   return entity;
 }
 
-inline std::unique_ptr<dds_qos_t, void (*)(dds_qos_t*)> qos_of(Quality quality, bool is_writer) {
+inline std::unique_ptr<dds_qos_t, void (*)(dds_qos_t*)> qos_of(Quality quality, bool is_writer,
+                                                               int latched_messages = 1) {
   std::unique_ptr<dds_qos_t, void (*)(dds_qos_t*)> qos(dds_create_qos(), dds_delete_qos);
   const bool is_reliable = quality != Quality::kSensorData, is_latched = quality == Quality::kLatched;
-  const int depth = !is_reliable ? 5 : is_latched && is_writer ? 1 : 100;
+  constexpr int kReliableDepth = 100;
+  const int depth = !is_reliable ? 5 : is_latched && is_writer ? latched_messages : kReliableDepth;
   dds_qset_reliability(qos.get(), is_reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, DDS_MSECS(100));
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth);
   dds_qset_durability(qos.get(), is_latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
@@ -66,10 +68,13 @@ dds_entity_t make_topic(dds_entity_t participant, const std::string& name) {
 template <typename Message>
 class Writer {
  public:
-  Writer(dds_entity_t participant, const std::string& name, Quality quality)
+  Writer(dds_entity_t participant, const std::string& name, Quality quality, int latched_messages = 1)
       : writer_(require(dds_create_writer(participant, make_topic<Message>(participant, name),
-                                          qos_of(quality, true).get(), nullptr),
+                                          qos_of(quality, true, latched_messages).get(), nullptr),
                         name)) {}
+  ~Writer() { dds_delete(writer_); }
+  Writer(const Writer&) = delete;
+  Writer& operator=(const Writer&) = delete;
   void write(const Message& message) const { (void)dds_write(writer_, &message); }
 
  private:

@@ -193,7 +193,15 @@ class RevisitNode final : public rclcpp_lifecycle::LifecycleNode, public node::O
     graph_->publish(Messages::loops(graph));
   }
   void send(const node::MapCloud& cloud) override {
-    map_->publish(std::make_unique<PointCloud2>(Messages::cloud(cloud, now().nanoseconds())));
+    const std::int64_t now_ns = now().nanoseconds();
+    const auto message = [&](const auto& points) {
+      return std::make_unique<PointCloud2>(Messages::cloud(cloud.map_frame, points, now_ns));
+    };
+    map_->publish(message(cloud.overview));
+    // A new publisher, which keeps as many messages for those that come later as there are tiles.
+    tiles_ = rclcpp::create_publisher<PointCloud2>(
+        *this, "~/map_tiles", rclcpp::QoS(std::max<std::size_t>(1, cloud.tiles.size())).transient_local());
+    for (const auto& tile : cloud.tiles) tiles_->publish(message(tile));
   }
   void send(const node::Health& health) override {
     diagnostics_->publish(Messages::health(health, get_fully_qualified_name(), now().nanoseconds()));
@@ -273,7 +281,7 @@ class RevisitNode final : public rclcpp_lifecycle::LifecycleNode, public node::O
   rclcpp::Publisher<Ros2::StampedPose>::SharedPtr loop_poses_, pose_;
   rclcpp::Publisher<Ros2::Path>::SharedPtr path_;
   rclcpp::Publisher<Ros2::MarkerArray>::SharedPtr graph_;
-  rclcpp::Publisher<PointCloud2>::SharedPtr map_;
+  rclcpp::Publisher<PointCloud2>::SharedPtr map_, tiles_;
   rclcpp::Publisher<tf2_msgs::msg::TFMessage>::SharedPtr tf_;
   rclcpp::Publisher<Ros2::DiagnosticArray>::SharedPtr diagnostics_;
   std::vector<rclcpp::SubscriptionBase::SharedPtr> subscriptions_;
