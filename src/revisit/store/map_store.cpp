@@ -38,7 +38,7 @@ Status MapStore::remove_file(const std::filesystem::path& file) {
   if (!std::filesystem::exists(file, failure)) return ok();
   const auto lock = store_internal::WriterLock::take(file);
   if (!lock) return lock.error();
-  for (const char* ending : {"", "-wal", "-shm"})
+  for (const char* ending : {"", "-wal", "-shm", "-journal"})
     if (std::filesystem::remove(file.string() + ending, failure); failure)
       return Error{file.string() + ending + ": cannot be removed: " + failure.message()};
   return ok();
@@ -50,6 +50,14 @@ Result<MapStore> MapStore::open(const std::filesystem::path& file, Access access
   sqlite3* const handle = (*database)->handle.get();
   if (const Status status = store_internal::check_length(file.string()); !status) return status.error();
   const auto version = store_internal::version_of(handle, file.string());
+  if (!version && access == Access::kRead && sqlite3_extended_errcode(handle) == SQLITE_READONLY_ROLLBACK) {
+    // Whoever wrote was killed before the write-ahead log began: only a writer takes back what is half done.
+    database->reset();
+    if (const auto taken_back = open(file, Access::kWrite); !taken_back)
+      return Error{file.string() +
+                   ": a write was interrupted, and cannot be taken back: " + taken_back.error().message};
+    return open(file, access);
+  }
   if (!version) return version.error();
   (*database)->version = *version;
   const bool is_readable = access == Access::kRead && *version >= store_internal::kOldestReadable;

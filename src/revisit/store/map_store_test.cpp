@@ -6,6 +6,7 @@
 #include <optional>
 
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -14,7 +15,7 @@ namespace {
 
 std::filesystem::path fresh_file(const std::string& name) {
   const auto file = std::filesystem::path(testing::TempDir()) / ("revisit_" + name + ".map");
-  for (const char* ending : {"", "-wal", "-shm"}) std::filesystem::remove(file.string() + ending);
+  for (const char* ending : {"", "-wal", "-shm", "-journal"}) std::filesystem::remove(file.string() + ending);
   return file;
 }
 
@@ -98,6 +99,31 @@ TEST(MapStore, SurvivesAKill) {
   ASSERT_EQ(keyframes->size(), 1u);
   EXPECT_EQ((*keyframes)[0].frame, FrameId{1});
   EXPECT_TRUE(store->add(keyframe(2)));
+}
+
+// Killed before its write-ahead log began, a writer leaves a rollback journal: a reader may not take it back by itself.
+TEST(MapStore, AReaderFindsTheMapWholeAfterAKillWithoutALog) {
+  const auto file = fresh_file("journal");
+  {
+    auto store = MapStore::create(file);
+    ASSERT_TRUE(store && store->add(keyframe(1)) && store->set_note("name", "before") && store->commit());
+  }
+  const pid_t child = fork();
+  if (child == 0) {
+    sqlite3* raw = nullptr;
+    sqlite3_open(file.c_str(), &raw);
+    sqlite3_exec(raw, "PRAGMA journal_mode=DELETE; BEGIN; UPDATE notes SET text='half done'", nullptr, nullptr,
+                 nullptr);
+    sqlite3_db_cacheflush(raw);
+    ::kill(getpid(), SIGKILL);
+  }
+  int how = 0;
+  waitpid(child, &how, 0);
+  ASSERT_TRUE(std::filesystem::exists(file.string() + "-journal"));
+  const auto store = MapStore::open(file, MapStore::Access::kRead);
+  ASSERT_TRUE(store) << store.error().message;
+  EXPECT_EQ(store->note("name")->value(), "before");
+  EXPECT_EQ(store->keyframes()->size(), 1u);
 }
 
 TEST(MapStore, OneWriterAtATimeAndAnyNumberOfReaders) {
