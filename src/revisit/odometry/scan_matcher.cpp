@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include <oneapi/tbb/task_arena.h>
 #include <oneapi/tbb/task_group.h>
 #include <Eigen/Eigenvalues>
 
@@ -76,12 +77,26 @@ double slid_m(const Matrix6& information, const Eigen::Vector3d& step) {
 
 }  // namespace
 
-struct ScanMatcher::Insertion {
-  tbb::task_group tasks;
-  ~Insertion() { tasks.wait(); }
+// Scans enter the map while the next is prepared. In an arena of its own: the caller's may be left before the work is
+// done, and from outside nobody works in it.
+class ScanMatcher::Insertion {
+ public:
   Insertion() = default;
   Insertion(const Insertion&) = delete;
   Insertion& operator=(const Insertion&) = delete;
+  ~Insertion() { wait(); }
+
+  template <typename Work>
+  void run(Work work) {
+    arena_.execute([&] { tasks_.run(std::move(work)); });
+  }
+  void wait() {
+    arena_.execute([&] { tasks_.wait(); });
+  }
+
+ private:
+  tbb::task_arena arena_;
+  tbb::task_group tasks_;
 };
 
 ScanMatcher::ScanMatcher(const Resolution& resolution)
@@ -150,7 +165,7 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
     match.is_tracked = true;  // the map begins wherever it is
     return match;
   }
-  insertion_->tasks.wait();
+  insertion_->wait();
   const auto align_points = [&](std::span<const Eigen::Vector3f> points, double width_m, const Pose& T_guess) {
     IcpResult icp = align_icp(*map_, points, T_odom_lidar_ * T_guess,
                               {.coarse_m = width_m,
@@ -232,8 +247,8 @@ void ScanMatcher::accept(double stamp_s, const MatcherScan& scan, const ScanMatc
   const Eigen::Vector3f here = T_odom_lidar_.translation().cast<float>();
   const bool forgets = (here - forgotten_from_).norm() > Matching::kForgetEvery_m;
   if (forgets) forgotten_from_ = here;
-  insertion_->tasks.wait();
-  insertion_->tasks.run(
+  insertion_->wait();
+  insertion_->run(
       [map = map_.get(), forgets, here,
        points = match.is_tracked ? in_map(scan.map_points, T_odom_lidar_) : std::vector<Eigen::Vector3f>()] {
         map->add(points);
@@ -249,7 +264,7 @@ void ScanMatcher::accept(double stamp_s, const MatcherScan& scan, const ScanMatc
 }
 
 void ScanMatcher::restart() {
-  insertion_->tasks.wait();
+  insertion_->wait();
   map_.reset();
   motion_.reset();
   squared_prediction_error_m2_ = typical_match_ = 0.0;

@@ -72,7 +72,7 @@ class ScanMatcher {
   bool has_map() const { return map_ != nullptr; }
 
  private:
-  struct Insertion;
+  class Insertion;
   ScanMatch match_within(double radius_m, double stamp_s, const MatcherScan& scan, const Pose& T_predicted,
                          std::optional<double> measured_m) const;
   double fine_m() const;

@@ -4,6 +4,7 @@
 #include <random>
 
 #include <gtest/gtest.h>
+#include <oneapi/tbb/task_arena.h>
 
 #include "synthetic_world.hpp"
 
@@ -42,6 +43,15 @@ TEST(ScanMatcher, FollowsABend) {
   const Pose error = (pose_of(0).inverse() * pose_of(29)).inverse() * T_found;
   EXPECT_LT(error.translation().norm(), 0.01 * 0.6 * 29) << "1 % of the travelled distance";
   EXPECT_LT(to_degrees(rotation_angle(error)), 0.5);
+}
+
+// Whoever limits threads by an arena need not end in it what was begun there.
+TEST(ScanMatcher, WorksInOneArenaAndEndsInAnother) {
+  ScanMatcher matcher;
+  tbb::task_arena one_thread(1);
+  for (int i = 0; i < 3; ++i)
+    one_thread.execute([&] { track(matcher, 0.1 * i, seen_from(31, pose_of(i), static_cast<unsigned>(i))); });
+  EXPECT_TRUE(track(matcher, 0.3, seen_from(31, pose_of(3), 3)).is_tracked);
 }
 
 // Turns and translations about an origin far away are nearly the same: they must not be solved for there.
