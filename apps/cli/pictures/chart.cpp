@@ -2,7 +2,8 @@
 #include "pictures/chart.hpp"
 
 #include <cmath>
-#include <cstdio>
+
+#include <revisit/core/text.hpp>
 
 namespace revisit::cli {
 namespace {
@@ -22,10 +23,8 @@ std::vector<double> ticks(const Chart::Range& range, double step) {
 }
 
 std::string number(double value, double step) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.*f", step >= 1.0 ? 0 : static_cast<int>(std::ceil(-std::log10(step))),
+  return format("%.*f", step >= 1.0 ? 0 : static_cast<int>(std::ceil(-std::log10(step))),
                 std::abs(value) < 1e-9 * step ? 0.0 : value);
-  return text;
 }
 
 void widen(Chart::Range& range, double span) {

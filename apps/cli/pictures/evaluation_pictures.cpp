@@ -2,7 +2,8 @@
 #include "pictures/evaluation_pictures.hpp"
 
 #include <algorithm>
-#include <cstdio>
+
+#include <revisit/core/text.hpp>
 
 #include "pictures/chart.hpp"
 
@@ -22,9 +23,9 @@ void draw_curve(Canvas& canvas, const Chart& chart, const RetrievalTable& table,
 
 void draw_legend_entry(Canvas& canvas, Pixel at, const Curve& curve) {
   const RetrievalTable& table = *curve.table;
-  char text[200];
-  std::snprintf(text, sizeof text, "%s: %zu revisits, R@1 %.3f, F1max %.3f, AP %.3f, R@P100 %.3f", curve.name.c_str(),
-                table.revisits, table.recall_at_1, table.f1_max, table.average_precision, table.recall_at_p100);
+  const std::string text =
+      format("%s: %zu revisits, R@1 %.3f, F1max %.3f, AP %.3f, R@P100 %.3f", curve.name.c_str(), table.revisits,
+             table.recall_at_1, table.f1_max, table.average_precision, table.recall_at_p100);
   canvas.line({at, {at.x + 30, at.y}}, curve.colour, 3);
   canvas.text({at.x + 40, at.y}, text, 14);
 }

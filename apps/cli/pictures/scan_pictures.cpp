@@ -2,7 +2,8 @@
 #include "pictures/scan_pictures.hpp"
 
 #include <cmath>
-#include <cstdio>
+
+#include <revisit/core/text.hpp>
 
 #include "pictures/chart.hpp"
 
@@ -42,11 +43,9 @@ void draw_from_above(Canvas& canvas, const PreparedScan& prepared, const Paramet
 void draw_descriptor(Canvas& canvas, const IntensityScanContext& descriptor, const DescriptorOptions& options) {
   const Box box{930, 70, 760, 620};
   Chart chart(canvas, box, {-180.0, 180.0}, {0.0, options.max_range_m});
-  char title[128];
-  std::snprintf(title, sizeof title,
-                "intensity scan context: %d rings x %d sectors x %d layers, %d of %zu cells occupied", descriptor.rings,
-                descriptor.sectors, descriptor.rows() / descriptor.rings, descriptor.occupied_cells(),
-                descriptor.image_cells());
+  const std::string title = format(
+      "intensity scan context: %d rings x %d sectors x %d layers, %d of %zu cells occupied", descriptor.rings,
+      descriptor.sectors, descriptor.rows() / descriptor.rings, descriptor.occupied_cells(), descriptor.image_cells());
   chart.draw_axes(title, "azimuth (degrees)", "range (m)");
   const double width = box.width / descriptor.sectors, height = box.height / descriptor.rings;
   for (int sector = 0; sector < descriptor.sectors; ++sector)

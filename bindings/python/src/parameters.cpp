@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <charconv>
+
 #include <revisit/config/parameter_file.hpp>
 #include <revisit/config/parameters.hpp>
 
@@ -17,7 +19,10 @@ py::object value_of(const Parameters& parameters, const ParameterInfo& info) {
   const std::string text = get_parameter(parameters, info.name);
   if (info.is_switch) return py::bool_(text == "true");
   if (info.is_text) return py::str(text);
-  return info.is_integer ? py::object(py::int_(std::stoll(text))) : py::object(py::float_(std::stod(text)));
+  if (info.is_integer) return py::int_(std::stoll(text));
+  double number = 0.0;  // as it was written, whatever locale Python has set
+  std::from_chars(text.data(), text.data() + text.size(), number);
+  return py::float_(number);
 }
 
 void check(const Status& status) {

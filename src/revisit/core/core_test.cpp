@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <clocale>
+#include <string>
+
 #include <gtest/gtest.h>
 
 #include <revisit/core/fast_math.hpp>
@@ -7,6 +10,7 @@
 #include <revisit/core/loop.hpp>
 #include <revisit/core/result.hpp>
 #include <revisit/core/scan.hpp>
+#include <revisit/core/text.hpp>
 
 namespace revisit {
 namespace {
@@ -70,6 +74,18 @@ TEST(IntensityCalibration, InterpolatesAndHoldsAtTheEnds) {
   EXPECT_DOUBLE_EQ(table.distance_gain(99.0), 3.0);
   EXPECT_DOUBLE_EQ(table.ring_gain(0), 0.5);
   EXPECT_DOUBLE_EQ(table.ring_gain(7), 1.0);
+}
+
+// A host may speak German: files keep their decimal points.
+TEST(Format, WritesDecimalPointsInEveryLocale) {
+  const std::string before = std::setlocale(LC_ALL, nullptr);
+  const bool is_there = std::setlocale(LC_ALL, "de_DE.UTF-8") != nullptr;
+  const std::string text = format("%.2f", 1.5);
+  const std::string of_host = std::to_string(1.5);
+  std::setlocale(LC_ALL, before.c_str());
+  EXPECT_EQ(text, "1.50");
+  if (!is_there) GTEST_SKIP() << "de_DE.UTF-8 is not installed; elsewhere this shows more";
+  EXPECT_EQ(of_host[1], ',');
 }
 
 TEST(LogSink, SilentWithoutASink) {

@@ -5,17 +5,25 @@
 #include <cstdio>
 #include <string>
 
+#include <locale.h>  // newlocale, uselocale: POSIX
+#ifdef __APPLE__
+#include <xlocale.h>
+#endif
+
 #include <revisit/core/ids.hpp>
 
 namespace revisit {
 
-/// As printf, up to 255 characters.
+/// As printf, up to 255 characters; numbers with a decimal point, whatever locale the program has set.
 [[gnu::format(printf, 1, 2)]] inline std::string format(const char* pattern, ...) {
+  static const locale_t plain = newlocale(LC_ALL_MASK, "C", nullptr);
+  const locale_t before = uselocale(plain);
   char text[256];
   std::va_list values;
   va_start(values, pattern);
   std::vsnprintf(text, sizeof text, pattern, values);
   va_end(values);
+  uselocale(before);
   return text;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <revisit/core/text.hpp>
 #include <revisit/io/convert_recording.hpp>
 
-#include <cstdio>
 #include <optional>
 
 #include <revisit/io/bag_writer.hpp>
@@ -78,11 +78,7 @@ class KittiTarget final : public Target {
   Status finish(const Recording& recording) override {
     if (recording.has_times()) {
       io_internal::TextWriter times(folder_ / "times.txt");
-      char row[40];
-      for (const double stamp_s : stamps_s_) {
-        std::snprintf(row, sizeof row, "%.9f\n", stamp_s);
-        times.stream() << row;
-      }
+      for (const double stamp_s : stamps_s_) times.stream() << format("%.9f\n", stamp_s);
       if (const Status status = times.finish(); !status) return status;
     }
     if (!wheels_.empty())

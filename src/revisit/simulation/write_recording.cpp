@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <revisit/core/text.hpp>
 #include <revisit/simulation/write_recording.hpp>
 
 #include <atomic>
@@ -28,11 +29,7 @@ Status make_folder(const fs::path& folder) {
 
 Status write_facts(const SimulatedRecording& recording, const fs::path& folder) {
   std::string times;
-  char row[32];
-  for (std::size_t i = 0; i < recording.size(); ++i) {
-    std::snprintf(row, sizeof row, "%.6f\n", recording.stamp_s(i));
-    times += row;
-  }
+  for (std::size_t i = 0; i < recording.size(); ++i) times += format("%.6f\n", recording.stamp_s(i));
   Parameters parameters;
   parameters.simulation = recording.options();
   if (std::string& file = parameters.simulation.trajectory; !file.empty()) file = fs::absolute(file).string();
