@@ -247,9 +247,10 @@ class Slam:
         """The loops in the graph, as a list of Loop."""
         return self._slam.loops()
 
-    def map(self):
-        """The map's points, N x 4 float32, without what moved; intensities in [0, 1]."""
-        return self._slam.map()
+    def map(self, progress=None):
+        """The map's points, N x 4 float32, without what moved; intensities in [0, 1]. progress(done) is called with the
+        key frames done."""
+        return self._slam.map(progress)
 
     def write_map(self, folder, progress=None):
         """map.ply, map.pcd and tiles; gives the number of points. progress(done) is called with the key frames done."""

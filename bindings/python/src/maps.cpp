@@ -76,7 +76,13 @@ void bind_slam(py::module_& module) {
                if (edge.loop) loops.push_back(*edge.loop);
              return loops;
            })
-      .def("map", [](SharedSlam& self) { return to_array(unwrap(self.use([](Slam& slam) { return slam.map(); }))); })
+      .def("map",
+           [](SharedSlam& self, py::object callback) {
+             PythonProgress progress(std::move(callback));
+             auto points = self.use([&](Slam& slam) { return slam.map(std::ref(progress)); });
+             progress.rethrow();
+             return to_array(unwrap(std::move(points)));
+           })
       .def("write_map", [](SharedSlam& self, const std::filesystem::path& folder, py::object callback) {
         PythonProgress progress(std::move(callback));
         const auto report = self.use([&](Slam& slam) { return slam.write_map(folder, std::ref(progress)); });

@@ -11,7 +11,11 @@ LogSink log_sink() {
     try {
       py::module_::import("logging").attr("getLogger")("revisit").attr("log")(number, "%s", text);
     } catch (py::error_already_set& error) {
-      error.discard_as_unraisable("revisit's log");
+      // The work goes on; where signals are looked for next, Ctrl-C is there once more.
+      if (error.matches(PyExc_KeyboardInterrupt))
+        PyErr_SetInterrupt();
+      else
+        error.discard_as_unraisable("revisit's log");
     }
   };
 }

@@ -4,6 +4,7 @@ import gc
 import json
 import logging
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -97,6 +98,34 @@ def test_a_call_from_its_own_callback_is_an_error(scans, tmp_path):
         slam.process(scan)
     with pytest.raises(RuntimeError, match="its own callback"):
         slam.write_map(tmp_path, lambda done: slam.trajectory())
+
+
+def test_ctrl_c_ends_a_map(scans):
+    slam = revisit.Slam()
+    for scan in scans[:10]:
+        slam.process(scan)
+    with pytest.raises(KeyboardInterrupt):
+        slam.map(lambda done: signal.raise_signal(signal.SIGINT))
+    assert len(slam.map())  # nothing is lost
+
+
+def test_ctrl_c_in_a_log_handler_is_not_swallowed(scans):
+    class Handler(logging.Handler):
+        def emit(self, record):
+            raise KeyboardInterrupt
+    logger, handler = logging.getLogger("revisit"), Handler()
+    before = logger.level
+    logger.setLevel(logging.DEBUG)
+    logger.addHandler(handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            slam = revisit.Slam()
+            for scan in scans[:10]:
+                slam.process(scan.points, stamp=0.0)  # a stamp that does not increase is logged
+            slam.map(lambda done: None)
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(before)
 
 
 def test_a_thread_at_work_does_not_spoil_the_end():

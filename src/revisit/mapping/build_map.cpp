@@ -143,19 +143,23 @@ Status write_index(const fs::path& file, const MapReport& report, const MapOptio
 
 }  // namespace
 
-Result<std::vector<Point>> collect_map(const MapInput& input, const MapOptions& options) {
+Result<std::vector<Point>> collect_map(const MapInput& input, const MapOptions& options,
+                                       const std::function<bool(std::size_t)>& progress) {
   std::vector<Point> points;
   std::size_t moving = 0, thin_at = 4'000'000;
-  const Status status = for_each_keyframe(input, options, moving, [&](const std::vector<Point>& placed, std::size_t) {
+  bool is_stopped = false;
+  const auto take = [&](const std::vector<Point>& placed, std::size_t done) {
     points.insert(points.end(), placed.begin(), placed.end());
     // Thinned meanwhile: most of what a key frame sees is in the map already.
     if (points.size() > thin_at) {
       points = one_point_a_voxel(points, options.voxel_m);
       thin_at = std::max(thin_at, 2 * points.size());
     }
-    return Next::kGoOn;
-  });
-  if (!status) return status.error();
+    is_stopped = progress && !progress(done);
+    return is_stopped ? Next::kStop : Next::kGoOn;
+  };
+  if (const Status status = for_each_keyframe(input, options, moving, take); !status) return status.error();
+  if (is_stopped) return std::vector<Point>{};
   return one_point_a_voxel(points, options.voxel_m);
 }
 

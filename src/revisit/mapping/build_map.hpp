@@ -42,8 +42,10 @@ struct MapInput {
   std::function<Result<std::vector<Point>>(std::size_t)> points;  ///< of key frame i in its own frame, or none
 };
 
-/// The map as points in the world's frame: one a voxel, without what moved. In memory at once.
-Result<std::vector<Point>> collect_map(const MapInput& input, const MapOptions& options);
+/// The map as points in the world's frame: one a voxel, without what moved. In memory at once. `progress(done)` counts
+/// key frames and stops the work by returning false: then there are none.
+Result<std::vector<Point>> collect_map(const MapInput& input, const MapOptions& options,
+                                       const std::function<bool(std::size_t)>& progress = {});
 
 /// Puts key frames together into `folder`: a file a format, and tiles/ with a .ply a tile and tiles.json.
 /// In memory are some key frames and one tile at a time. `progress(done)` counts key frames and stops the work

@@ -205,8 +205,8 @@ MapInput Slam::map_input() const {
           [this, frames = std::move(frames)](std::size_t i) { return read_map_points(*store_, frames[i]); }};
 }
 
-Result<std::vector<Point>> Slam::map() const {
-  return collect_map(map_input(), {.voxel_m = parameters_.slam.map_voxel_m});
+Result<std::vector<Point>> Slam::map(const std::function<bool(std::size_t)>& progress) const {
+  return collect_map(map_input(), {.voxel_m = parameters_.slam.map_voxel_m}, progress);
 }
 
 Result<MapReport> Slam::write_map(const std::filesystem::path& folder,

@@ -82,10 +82,10 @@ class Slam {
   };
   /// Of this session, by the frames of its recording.
   Result<Trajectories> trajectories() const;
-  /// The map in the world's frame: a point a voxel, without what moved. Intensities in [0, 1].
-  Result<std::vector<Point>> map() const;
-  /// The same as files (docs/formats.md), however large. `progress(done)` counts key frames and stops the work by
-  /// returning false.
+  /// The map in the world's frame: a point a voxel, without what moved. Intensities in [0, 1]. `progress(done)` counts
+  /// key frames and stops the work by returning false: then there are no points.
+  Result<std::vector<Point>> map(const std::function<bool(std::size_t)>& progress = {}) const;
+  /// The same as files (docs/formats.md), however large.
   Result<MapReport> write_map(const std::filesystem::path& folder,
                               const std::function<bool(std::size_t)>& progress = {}) const;
 
