@@ -136,7 +136,8 @@ TEST(Cli, CompareRunsEachMethodOverTheSameScans) {
   const std::string exclusion = " --retrieval.exclude_frames 3 --retrieval.exclude_s 3";
   const Outcome all = run("compare " + drive.string() + exclusion + " --out " + out.string());
   ASSERT_EQ(all.code, 0) << all.output;
-  for (const char* method : {"revisit", "isc-paper", "isc-program", "scan-context-ring-key", "scan-context", "m2dp"}) {
+  for (const char* method : {"revisit", "isc-paper", "isc-program", "scan-context-ring-key", "scan-context", "scan-context++",
+                             "m2dp", "glarot3d", "lidar-iris", "ring", "solid"}) {
     EXPECT_NE(all.output.find(method), std::string::npos) << all.output;
     EXPECT_TRUE(fs::exists(out / method / "candidates.csv")) << method;
   }
@@ -147,6 +148,28 @@ TEST(Cli, CompareRunsEachMethodOverTheSameScans) {
   ASSERT_TRUE(answers);
   EXPECT_EQ(answers->size(), 9u);
   for (const CandidateRow& row : *answers) EXPECT_LE(row.match->value, row.query.value - 3);
+
+  EXPECT_NE(content(out / "comparison.tex").find("scan-context++ &"), std::string::npos);
+
+  // What Scan Context answers is registered as ours is; answers from elsewhere are judged beside it.
+  const fs::path verified = folder / "verified";
+  const Outcome more = run("compare " + drive.string() + exclusion + " --methods revisit,scan-context --verify" +
+                           " --candidates foreign=" + (out / "scan-context" / "candidates.csv").string() + " --out " +
+                           verified.string());
+  ASSERT_EQ(more.code, 0) << more.output;
+  const auto ours = read_loops(verified / "revisit" / "loops.csv"),
+             theirs = read_loops(verified / "scan-context" / "loops.csv");
+  ASSERT_TRUE(ours && theirs);
+  EXPECT_FALSE(ours->empty());
+  EXPECT_FALSE(theirs->empty());
+  const std::string csv = content(verified / "comparison.csv");
+  const auto figures = [&](const std::string& name) {
+    const std::size_t begin = csv.find("\n" + name + ",") + name.size() + 2;
+    return csv.substr(begin, 60);  // of table 1
+  };
+  EXPECT_EQ(figures("foreign"), figures("scan-context")) << csv;
+  const Outcome nameless = run("compare " + drive.string() + " --candidates file --out " + (folder / "z").string());
+  EXPECT_EQ(nameless.code, 2) << nameless.output;
 
   const Outcome again = run("compare " + drive.string() + exclusion + " --methods m2dp --out " + out.string());
   EXPECT_EQ(again.code, 1) << again.output;  // results are there already

@@ -12,30 +12,73 @@
 
 namespace revisit::cli {
 
-std::string to_text(const std::vector<MethodReport>& methods) {
-  Table retrieval = {
-      {"", "revisits", "R@1", "F1max", "AP", "R@P100", "EP", "reverse R@1", "reverse R@P100", "ms a scan"}};
-  Table loops = {{"", "accepted", "false loops", "recall", "reverse recall", "translation median", "rotation median"}};
+namespace {
+
+std::string figure(double value, std::size_t of) { return of == 0 ? std::string("-") : format("%.3f", value); }
+std::string cost(double ms) { return ms > 0.0 ? format("%.2f", ms) : std::string("-"); }
+
+Table retrieval_table(const std::vector<MethodReport>& methods) {
+  Table table = {{"", "revisits", "R@1", "F1max", "AP", "R@P100", "EP", "reverse R@1", "reverse R@P100", "ms a scan",
+                  "kB a place"}};
   for (const MethodReport& method : methods) {
     const RetrievalTable &all = method.evaluation.retrieval, &reverse = method.evaluation.reverse_retrieval;
-    const auto figure = [](double value, std::size_t of) { return of == 0 ? std::string("-") : format("%.3f", value); };
-    retrieval.push_back({method.name, std::to_string(all.revisits), figure(all.recall_at_1, all.revisits),
-                         figure(all.f1_max, all.revisits), figure(all.average_precision, all.revisits),
-                         figure(all.recall_at_p100, all.revisits), figure(all.extended_precision, all.revisits),
-                         figure(reverse.recall_at_1, reverse.revisits),
-                         figure(reverse.recall_at_p100, reverse.revisits), format("%.1f", method.ms_per_scan)});
+    table.push_back(
+        {method.name, std::to_string(all.revisits), figure(all.recall_at_1, all.revisits),
+         figure(all.f1_max, all.revisits), figure(all.average_precision, all.revisits),
+         figure(all.recall_at_p100, all.revisits), figure(all.extended_precision, all.revisits),
+         figure(reverse.recall_at_1, reverse.revisits), figure(reverse.recall_at_p100, reverse.revisits),
+         cost(method.retrieval_ms),
+         method.bytes_a_place == 0 ? "-" : format("%.1f", static_cast<double>(method.bytes_a_place) / 1e3)});
+  }
+  return table;
+}
+
+Table loop_table(const std::vector<MethodReport>& methods) {
+  Table table = {{"", "accepted", "false loops", "recall", "reverse recall", "translation median", "rotation median",
+                  "ms a scan"}};
+  for (const MethodReport& method : methods) {
     if (!method.gives_poses) continue;
     const LoopTable& t = method.evaluation.loops;
-    loops.push_back({method.name, std::to_string(t.accepted), std::to_string(t.false_loops),
+    table.push_back({method.name, std::to_string(t.accepted), std::to_string(t.false_loops),
                      figure(t.recall, t.revisits), figure(t.reverse_recall, t.reverse_revisits),
                      t.accepted == 0 ? "-" : format("%.3f m", t.median_translation_m),
-                     t.accepted == 0 ? "-" : format("%.3f deg", t.median_rotation_deg)});
+                     t.accepted == 0 ? "-" : format("%.3f deg", t.median_rotation_deg), cost(method.verification_ms)});
   }
-  std::string text = "Table 1, retrieval (top-1, score swept)\n" + to_text(retrieval) +
-                     "\nTable 2, loop constraints (as accepted), of the methods that give a pose\n" + to_text(loops) +
-                     "\n";
+  return table;
+}
+
+}  // namespace
+
+std::string to_text(const std::vector<MethodReport>& methods) {
+  std::string text = "Table 1, retrieval (top-1, score swept; time and memory of describing and searching)\n" +
+                     to_text(retrieval_table(methods)) +
+                     "\nTable 2, loop constraints (as accepted; time of verification), of what was verified\n" +
+                     to_text(loop_table(methods)) + "\n";
   for (const MethodReport& method : methods) text += method.name + ": " + method.source + "\n";
   return text;
+}
+
+std::string to_csv(const std::vector<MethodReport>& methods) {
+  std::string text =
+      "method,revisits,recall_at_1,f1_max,average_precision,recall_at_p100,extended_precision,reverse_revisits,"
+      "reverse_recall_at_1,reverse_recall_at_p100,accepted,false_loops,recall,reverse_recall,median_translation_m,"
+      "median_rotation_deg,retrieval_ms,verification_ms,bytes_a_place\n";
+  for (const MethodReport& method : methods) {
+    const RetrievalTable &all = method.evaluation.retrieval, &reverse = method.evaluation.reverse_retrieval;
+    const LoopTable& t = method.evaluation.loops;
+    text += method.name + format(",%zu,%.6f,%.6f,%.6f,%.6f,%.6f,%zu,%.6f,%.6f", all.revisits, all.recall_at_1,
+                                 all.f1_max, all.average_precision, all.recall_at_p100, all.extended_precision,
+                                 reverse.revisits, reverse.recall_at_1, reverse.recall_at_p100);
+    text += method.gives_poses ? format(",%zu,%zu,%.6f,%.6f,%.6f,%.6f", t.accepted, t.false_loops, t.recall,
+                                        t.reverse_recall, t.median_translation_m, t.median_rotation_deg)
+                               : ",,,,,,";
+    text += format(",%.6f,%.6f,%zu\n", method.retrieval_ms, method.verification_ms, method.bytes_a_place);
+  }
+  return text;
+}
+
+std::string to_latex(const std::vector<MethodReport>& methods) {
+  return to_latex(retrieval_table(methods)) + "\n" + to_latex(loop_table(methods));
 }
 
 std::string to_json(const std::vector<MethodReport>& methods) {
@@ -44,7 +87,9 @@ std::string to_json(const std::vector<MethodReport>& methods) {
     auto entry = nlohmann::ordered_json::parse(to_json(method.evaluation));
     if (!method.gives_poses) entry.erase("table_2");
     entry["source"] = method.source;
-    entry["ms_per_scan"] = method.ms_per_scan;
+    entry["retrieval_ms"] = method.retrieval_ms;
+    entry["verification_ms"] = method.verification_ms;
+    entry["bytes_a_place"] = method.bytes_a_place;
     document[method.name] = std::move(entry);
   }
   return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";

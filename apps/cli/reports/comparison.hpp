@@ -14,14 +14,20 @@ namespace revisit::cli {
 /// One method's tables 1 and 2, and what it is.
 struct MethodReport {
   std::string name, source;
-  bool gives_poses = false;  ///< otherwise there is no table 2
-  double ms_per_scan = 0.0;  ///< describing, searching and verifying
+  bool gives_poses = false;      ///< otherwise there is no table 2
+  double retrieval_ms = 0.0;     ///< describing and searching, a scan, on one thread
+  double verification_ms = 0.0;  ///< likewise
+  std::size_t bytes_a_place = 0;
   EvaluationReport evaluation;
 };
 
 /// All methods in one table each, a row a method.
 std::string to_text(const std::vector<MethodReport>& methods);
 std::string to_json(const std::vector<MethodReport>& methods);
+/// A row a method, all columns of both tables.
+std::string to_csv(const std::vector<MethodReport>& methods);
+/// Both tables for a paper (package booktabs).
+std::string to_latex(const std::vector<MethodReport>& methods);
 /// Precision over recall of all of them.
 Status draw_comparison(const std::filesystem::path& file, const std::vector<MethodReport>& methods);
 

@@ -18,6 +18,18 @@ std::string to_text(const Table& table) {
   return text;
 }
 
+std::string to_latex(const Table& table) {
+  std::string text = "\\begin{tabular}{l" + std::string(table[0].size() - 1, 'r') + "}\n\\toprule\n";
+  for (std::size_t r = 0; r < table.size(); ++r) {
+    for (std::size_t i = 0; i < table[r].size(); ++i) {
+      if (i > 0) text += " & ";
+      for (const char c : table[r][i]) text += std::string(c == '_' || c == '%' || c == '&' || c == '#', '\\') + c;
+    }
+    text += r == 0 ? " \\\\\n\\midrule\n" : " \\\\\n";
+  }
+  return text + "\\bottomrule\n\\end{tabular}\n";
+}
+
 std::string html_escape(const std::string& text) {
   std::string safe;
   for (const char c : text) safe += c == '<' ? "&lt;" : c == '&' ? "&amp;" : std::string(1, c);

@@ -11,6 +11,7 @@ using Table = std::vector<std::vector<std::string>>;
 
 std::string to_text(const Table& table);  ///< columns to the right, each as wide as its widest cell
 std::string to_html(const Table& table);
+std::string to_latex(const Table& table);  ///< a tabular in the style of booktabs
 std::string html_escape(const std::string& text);
 
 }  // namespace revisit::cli

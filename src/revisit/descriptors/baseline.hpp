@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -12,12 +14,18 @@
 
 namespace revisit {
 
-/// A published place descriptor to compare with, written from its paper. A new one is one file that implements this
-/// and a line in make_baselines(). Stateless: safe to share between threads.
+/// A published place descriptor to compare with, written from its paper. A new one is one file in baselines/ that
+/// implements this and a line in make_baselines(). Stateless: safe to share between threads.
 class Baseline {
  public:
-  /// What the method keeps of a scan, in a shape of its own.
-  using Signature = Eigen::MatrixXf;
+  /// What the method keeps of a scan, in shapes of its own.
+  struct Signature {
+    Eigen::MatrixXf values;
+    std::vector<std::uint64_t> bits;
+    std::size_t bytes() const {
+      return static_cast<std::size_t>(values.size()) * sizeof(float) + bits.size() * sizeof(std::uint64_t);
+    }
+  };
 
   Baseline() = default;
   Baseline(const Baseline&) = delete;

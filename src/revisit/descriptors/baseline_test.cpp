@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <stdexcept>
 
 #include <gtest/gtest.h>
 
@@ -56,33 +57,91 @@ TEST_P(EachBaseline, FindsThePlaceAgainWhenTurned) {
 TEST_P(EachBaseline, APlaceIsMostLikeItself) {
   const auto a = method->describe(made_place(1), -1.7), b = method->describe(made_place(2), -1.7);
   EXPECT_GT(method->similarity(a, a), method->similarity(a, b));
-  EXPECT_TRUE(method->describe({}, -1.7).allFinite());
+  EXPECT_TRUE(method->describe({}, -1.7).values.allFinite());
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, EachBaseline, testing::Range(std::size_t{0}, make_baselines().size()),
                          [](const auto& each) {
                            std::string name = make_baselines()[each.param]->name();
-                           std::replace(name.begin(), name.end(), '-', '_');
+                           std::replace_if(
+                               name.begin(), name.end(), [](char c) { return c == '-' || c == '+'; }, '_');
                            return name;
                          });
 
+std::unique_ptr<Baseline> baseline_of(const std::string& name) {
+  for (auto& each : make_baselines())
+    if (each->name() == name) return std::move(each);
+  throw std::invalid_argument(name);
+}
+
 TEST(ScanContextBaseline, TurnedByWholeSectorsItIsTheSame) {
-  const auto method = std::move(make_baselines()[3]);
-  ASSERT_EQ(method->name(), "scan-context");
+  const auto method = baseline_of("scan-context");
   const auto place = method->describe(made_place(3), -1.7);
   EXPECT_NEAR(method->similarity(place, place), 1.0, 1e-5);
-  Eigen::MatrixXf shifted(place.rows(), place.cols());
-  for (Eigen::Index j = 0; j < place.cols(); ++j) shifted.col((j + 17) % place.cols()) = place.col(j);
+  Baseline::Signature shifted = place;
+  const Eigen::Index sectors = place.values.cols();
+  for (Eigen::Index j = 0; j < sectors; ++j) shifted.values.col((j + 17) % sectors) = place.values.col(j);
   EXPECT_NEAR(method->similarity(place, shifted), 1.0, 1e-5);
 }
 
+std::vector<Point> moved(std::vector<Point> points, float x_m, float y_m) {
+  for (Point& p : points) p.x -= x_m, p.y -= y_m;
+  return points;
+}
+
+// A lane beside: what Scan Context++ was made for.
+TEST(ScanContextPlusPlusBaseline, ALaneBesideItIsMoreAlikeThanScanContext) {
+  const auto augmented = baseline_of("scan-context++"), plain = baseline_of("scan-context");
+  const auto place = made_place(4), query = moved(made_place(4), 0.f, 2.f);
+  const auto similarity = [&](const Baseline& method) {
+    return method.similarity(method.describe(query, -1.7), method.describe(place, -1.7));
+  };
+  EXPECT_NEAR(similarity(*augmented), 1.0, 1e-4);
+  EXPECT_LT(similarity(*plain), 0.95);
+}
+
+// Moved cells keep their Radon transform but for a shift of its offsets, whose magnitudes do not see it.
+TEST(RingBaseline, AMovedPlaceIsTheSame) {
+  const auto method = baseline_of("ring");
+  const auto place = method->describe(made_place(5), -1.7), other = method->describe(made_place(6), -1.7);
+  const float cell_m = 140.f / 120.f;
+  const auto query = method->describe(moved(made_place(5), 4 * cell_m, -3 * cell_m), -1.7);
+  EXPECT_GT(method->similarity(query, place), 0.9);
+  EXPECT_GT(method->similarity(query, place), method->similarity(query, other) + 0.05);
+}
+
+TEST(LidarIrisBaseline, TurnedByWholeColumnsItIsTheSame) {
+  const auto method = baseline_of("lidar-iris");
+  const auto place = made_place(7);
+  EXPECT_DOUBLE_EQ(method->similarity(method->describe(place, -1.7), method->describe(place, -1.7)), 1.0);
+  EXPECT_GT(method->similarity(method->describe(turned(place, to_radians(90.0)), -1.7), method->describe(place, -1.7)),
+            0.95);
+}
+
+// Pairs of keypoints do not change where the sensor is moved, as long as it sees the same ones.
+TEST(Glarot3dBaseline, AMovedPlaceIsTheSame) {
+  const auto method = baseline_of("glarot3d");
+  auto place = made_place(8);
+  std::erase_if(place, [](const Point& p) { return std::hypot(p.x, p.y) > 30.f; });
+  const auto query = method->describe(moved(place, 4.f, -3.f), -1.7);
+  EXPECT_NEAR(method->similarity(query, method->describe(place, -1.7)), 1.0, 1e-3);
+  EXPECT_LT(method->similarity(query, method->describe(made_place(9), -1.7)), 0.8);
+}
+
+TEST(SolidBaseline, TurnsDoNotMatterAndItKeepsFortyNumbers) {
+  const auto method = baseline_of("solid");
+  const auto place = made_place(10);
+  const auto signature = method->describe(place, -1.7);
+  EXPECT_EQ(signature.bytes(), 40 * sizeof(float));
+  EXPECT_NEAR(method->similarity(signature, method->describe(turned(place, to_radians(66.0)), -1.7)), 1.0, 0.02);
+}
+
 TEST(PublishedIscBaseline, OccupiedCellsNeverAgree) {
-  const auto method = std::move(make_baselines()[1]);
-  ASSERT_EQ(method->name(), "isc-program");
+  const auto method = baseline_of("isc-program");
   // All cells occupied, alike in both: geometry sees no cell that agrees, intensity no difference.
-  const Baseline::Signature full = Baseline::Signature::Constant(20, 60, 100.f);
+  const Baseline::Signature full{Eigen::MatrixXf::Constant(20, 60, 100.f), {}};
   EXPECT_DOUBLE_EQ(method->similarity(full, full), 1.0);
-  const Baseline::Signature empty = Baseline::Signature::Zero(20, 60), ones = Baseline::Signature::Ones(20, 60);
+  const Baseline::Signature empty{Eigen::MatrixXf::Zero(20, 60), {}}, ones{Eigen::MatrixXf::Ones(20, 60), {}};
   EXPECT_DOUBLE_EQ(method->similarity(empty, empty), 2.0);
   EXPECT_DOUBLE_EQ(method->similarity(ones, ones), 2.0);
 }

@@ -5,10 +5,9 @@
 #include <memory>
 #include <optional>
 
-#include <revisit/odometry/odometry.hpp>
 #include <revisit/pipeline/detection.hpp>
+#include <revisit/pipeline/detection_front_end.hpp>
 #include <revisit/pipeline/place_recognition.hpp>
-#include <revisit/verification/typical_agreement.hpp>
 
 namespace revisit {
 
@@ -39,29 +38,12 @@ class LoopDetector {
   const PlaceIndex& index() const { return recognition_.index(); }
 
  private:
-  struct Prepared {
-    PreparedScan scan;
-    double odometry_ms = 0.0;
-  };
-  Result<Prepared> follow_and_prepare(Scan scan);
-  TrajectoryPoint next_point(const OdometryStep& step, PreparedScan& prepared);
+  Result<DetectionFrontEnd::Step> follow(Scan scan);
   Status remember(PreparedScan prepared, const std::optional<Pose>& T_world_lidar);
 
-  Parameters parameters_;
-  Odometry odometry_;
-  ScanPreparation preparation_;
+  DetectionFrontEnd front_end_;
   PlaceRecognition recognition_;
-  TypicalAgreementEstimate typical_;
-  TrajectoryPoint point_;  ///< of the last scan
-  struct Tracked {
-    TrajectoryPoint point;
-    int segment = 0;  ///< of odometry
-    Pose T_odom_lidar = Pose::Identity();
-  };
-  std::optional<Tracked> tracked_;                ///< the last scan that odometry tracked
-  int origins_ = 0;                               ///< of trajectory points, so far
-  std::shared_ptr<const ScanGeometry> previous_;  ///< likewise; null where it described no place
-  std::map<FrameId, Pose> T_world_places_;        ///< of places that came with a pose
+  std::map<FrameId, Pose> T_world_places_;  ///< of places that came with a pose
 };
 
 }  // namespace revisit

@@ -28,7 +28,7 @@ Result<Detection> PlaceRecognition::find(const PreparedScan& query, std::size_t 
   detection.preparation_ms = query.ms;
 
   Stopwatch watch;
-  auto candidates = index_.search(query.descriptor, places);
+  auto candidates = this->candidates(query, places);
   if (!candidates) return candidates.error();
   detection.candidates = *std::move(candidates);
   detection.search_ms = watch.lap_ms();
@@ -39,6 +39,18 @@ Result<Detection> PlaceRecognition::find(const PreparedScan& query, std::size_t 
   recent_queries_.push_back({detection.frame, query.descriptor});
   if (recent_queries_.size() > kTemporalPairs) recent_queries_.pop_front();
   return detection;
+}
+
+Result<std::vector<LoopCandidate>> PlaceRecognition::candidates(const PreparedScan& query, std::size_t places) const {
+  if (!retrieval_) return index_.search(query.descriptor, places);
+  std::vector<LoopCandidate> candidates;
+  for (const FrameId frame : retrieval_(query, places)) {
+    const auto descriptor = index_.find(frame);
+    if (!descriptor) continue;
+    candidates.push_back(match_descriptors(query.descriptor, *descriptor));
+    candidates.back().match = frame;
+  }
+  return candidates;
 }
 
 VerificationContext PlaceRecognition::context(const TypicalAgreement& typical) const {

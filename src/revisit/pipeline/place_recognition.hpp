@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include <revisit/pipeline/detection.hpp>
 #include <revisit/retrieval/place_index.hpp>
@@ -53,6 +54,11 @@ class PlaceRecognition {
     parameters_.geometric = parameters.geometric;
   }
 
+  /// Another's retrieval instead of the index's: of the first `places` places of the index, those that may show what
+  /// the query shows, best first.
+  using Retrieval = std::function<std::vector<FrameId>(const PreparedScan& query, std::size_t places)>;
+  void set_retrieval(Retrieval retrieval) { retrieval_ = std::move(retrieval); }
+
   const PlaceIndex& index() const { return index_; }
   /// How much alike the places are (LookAlikes): as this run learnt, or as the map says.
   double look_alikes_log_odds() const { return look_alikes_of_map_ ? *look_alikes_of_map_ : look_alikes_.log_odds(); }
@@ -60,12 +66,14 @@ class PlaceRecognition {
 
  private:
   VerificationContext context(const TypicalAgreement& typical) const;
+  Result<std::vector<LoopCandidate>> candidates(const PreparedScan& query, std::size_t places) const;
   Status verify(const PreparedScan& query, const TypicalAgreement& typical, Detection& detection);
   Status learn_look_alikes(const PreparedScan& query, CandidateRegistration& registration);
   void accept(const PreparedScan& query, Hypothesis& answer, const ScanGeometry& query_geometry, Detection& detection);
 
   Parameters parameters_;
   PlaceIndex index_;
+  Retrieval retrieval_;  ///< absent: the index's
   std::unique_ptr<PlaceClouds> clouds_;
   mutable PlaceGeometries geometries_;
   TrajectoryPoints points_;  ///< of all places

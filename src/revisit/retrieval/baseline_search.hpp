@@ -24,6 +24,8 @@ class BaselineSearch {
   std::optional<CandidateRow> process(const FrameTime& query, std::span<const Point> points, double ground_z_m);
 
   const Baseline& method() const { return *method_; }
+  /// What the method keeps, in the mean.
+  std::size_t bytes_a_place() const { return places_.empty() ? 0 : bytes_ / places_.size(); }
 
  private:
   struct Place {
@@ -37,6 +39,7 @@ class BaselineSearch {
   std::unique_ptr<Baseline> method_;
   ExclusionRule exclusion_;
   std::vector<Place> places_;
+  std::size_t bytes_ = 0;  ///< of all signatures and keys
 };
 
 }  // namespace revisit

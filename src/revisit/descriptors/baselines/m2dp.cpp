@@ -6,6 +6,7 @@
 // may differ. At most 16,384 points are taken, evenly through the scan.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/Eigenvalues>
 
@@ -43,7 +44,7 @@ class M2dp final : public Baseline {
   std::string source() const override { return "He, Wang and Zhang, IROS 2016"; }
 
   Signature describe(std::span<const Point> points, double) const override {
-    if (points.empty()) return Signature::Zero(kPlanes + kBins, 1);
+    if (points.empty()) return {Eigen::MatrixXf::Zero(kPlanes + kBins, 1), {}};
     const Eigen::Matrix3Xf cloud = in_principal_axes(points);
     const float farthest = std::max(1e-3f, cloud.colwise().norm().maxCoeff());
     Eigen::MatrixXf counts = Eigen::MatrixXf::Zero(kPlanes, kBins);
@@ -71,14 +72,15 @@ class M2dp final : public Baseline {
     // The first left singular vector, and with it the right one.
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXf> squares(counts * counts.transpose());
     const Eigen::VectorXf left = squares.eigenvectors().col(kPlanes - 1);
-    Signature result(kPlanes + kBins, 1);
+    Eigen::MatrixXf result(kPlanes + kBins, 1);
     result << left, (counts.transpose() * left).normalized();
     // Counts are not negative, so neither are the first singular vectors but for a common sign.
-    return result.sum() < 0.f ? Signature(-result) : result;
+    if (result.sum() < 0.f) result = -result;
+    return {std::move(result), {}};
   }
 
   double similarity(const Signature& query, const Signature& place) const override {
-    return -static_cast<double>((query - place).norm());
+    return -static_cast<double>((query.values - place.values).norm());
   }
 };
 

@@ -10,7 +10,12 @@ std::vector<std::unique_ptr<Baseline>> make_baselines() {
   all.push_back(make_published_isc());
   all.push_back(make_scan_context(10));
   all.push_back(make_scan_context(0));
+  all.push_back(make_scan_context_pp());
   all.push_back(make_m2dp());
+  all.push_back(make_glarot3d());
+  all.push_back(make_lidar_iris());
+  all.push_back(make_ring());
+  all.push_back(make_solid());
   return all;
 }
 

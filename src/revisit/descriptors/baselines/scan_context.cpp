@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Kim and Kim, "Scan Context: Egocentric Spatial Descriptor for Place Recognition within 3D Point Cloud Map",
-// IROS 2018: 20 rings x 60 sectors up to 80 m, each cell the height of its highest point; the distance of two scans is
-// the mean cosine distance of their columns (eq. 6) at the best of all column shifts (eq. 7); the ring key finds those
-// that are compared (section III-C). Two things as in the authors' program, with which its figures were reached:
-// heights count from a little below the ground, so that cells of bare ground are occupied, and the key is the mean
-// height of a ring (in the paper: the share of its cells that are occupied).
+// IROS 2018: the distance of two scans is the mean cosine distance of their columns (eq. 6) at the best of all column
+// shifts (eq. 7); the ring key finds those that are compared (section III-C). The key is the mean height of a ring, as
+// in the authors' program, with which its figures were reached (in the paper: the share of its cells that are
+// occupied).
 #include <algorithm>
 #include <cmath>
 
 #include <revisit/core/pose.hpp>
 #include <revisit/descriptors/internal/baselines.hpp>
+#include <revisit/descriptors/internal/polar_heights.hpp>
 
 namespace revisit::descriptors_internal {
 namespace {
@@ -29,27 +29,14 @@ class ScanContext final : public Baseline {
   }
 
   Signature describe(std::span<const Point> points, double ground_z_m) const override {
-    Signature image = Signature::Zero(kRings, kSectors);
-    const float lowest_m = static_cast<float>(ground_z_m) - kBelowGround_m;
-    for (const Point& p : points) {
-      const float range_m = std::hypot(p.x, p.y);
-      if (range_m >= kMaxRange_m) continue;
-      const int ring = static_cast<int>(range_m * kRings / kMaxRange_m);
-      const float turns = (std::atan2(p.y, p.x) + static_cast<float>(kPi)) / static_cast<float>(2.0 * kPi);
-      const int sector = std::min(static_cast<int>(turns * kSectors), kSectors - 1);
-      image(ring, sector) = std::max(image(ring, sector), p.z - lowest_m);
-    }
-    return image;
+    return {polar_heights(points, ground_z_m), {}};
   }
 
   double similarity(const Signature& query, const Signature& place) const override {
     // Columns of unit length, so that a cosine is one product; empty columns stay zero.
-    const auto inverse_lengths = [](const Signature& image) {
-      return Eigen::VectorXf(image.colwise().norm().unaryExpr([](float n) { return n > 0.f ? 1.f / n : 0.f; }));
-    };
-    const Eigen::VectorXf query_scale = inverse_lengths(query), place_scale = inverse_lengths(place);
+    const Eigen::VectorXf query_scale = inverse_lengths(query.values), place_scale = inverse_lengths(place.values);
     const Eigen::Matrix<float, kSectors, kSectors> cosines =
-        query_scale.asDiagonal() * (query.transpose() * place) * place_scale.asDiagonal();
+        query_scale.asDiagonal() * (query.values.transpose() * place.values) * place_scale.asDiagonal();
     double best = 0.0;
     for (int shift = 0; shift < kSectors; ++shift) {
       // A cosine with an empty column is not defined: such pairs do not count.
@@ -65,9 +52,9 @@ class ScanContext final : public Baseline {
     return best;
   }
 
-  Eigen::VectorXf key(const Signature& image) const override {
+  Eigen::VectorXf key(const Signature& signature) const override {
     if (nearest_ring_keys_ == 0) return {};
-    return image.rowwise().mean();
+    return signature.values.rowwise().mean();
   }
   std::size_t nearest_keys() const override { return nearest_ring_keys_; }
 
@@ -76,6 +63,25 @@ class ScanContext final : public Baseline {
 };
 
 }  // namespace
+
+Eigen::MatrixXf polar_heights(std::span<const Point> points, double ground_z_m, float left_m) {
+  Eigen::MatrixXf image = Eigen::MatrixXf::Zero(kRings, kSectors);
+  const float lowest_m = static_cast<float>(ground_z_m) - kBelowGround_m;
+  for (const Point& p : points) {
+    const float y = p.y - left_m;
+    const float range_m = std::hypot(p.x, y);
+    if (range_m >= kMaxRange_m) continue;
+    const int ring = static_cast<int>(range_m * kRings / kMaxRange_m);
+    const float turns = (std::atan2(y, p.x) + static_cast<float>(kPi)) / static_cast<float>(2.0 * kPi);
+    const int sector = std::min(static_cast<int>(turns * kSectors), kSectors - 1);
+    image(ring, sector) = std::max(image(ring, sector), p.z - lowest_m);
+  }
+  return image;
+}
+
+Eigen::VectorXf inverse_lengths(const Eigen::MatrixXf& image) {
+  return image.colwise().norm().unaryExpr([](float n) { return n > 0.f ? 1.f / n : 0.f; });
+}
 
 std::unique_ptr<Baseline> make_scan_context(std::size_t nearest_ring_keys) {
   return std::make_unique<ScanContext>(nearest_ring_keys);

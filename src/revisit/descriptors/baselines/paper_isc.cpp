@@ -3,6 +3,7 @@
 // alone can tell. The ground is left out by its height.
 #include <algorithm>
 #include <iterator>
+#include <utility>
 #include <vector>
 
 #include <revisit/descriptors/intensity_scan_context.hpp>
@@ -15,7 +16,7 @@ namespace {
 constexpr int kRings = 60, kSectors = 20;
 constexpr float kAboveGround_m = 0.3f, kEmpty = -1.f;
 
-IntensityScanContext to_context(const Baseline::Signature& image) {
+IntensityScanContext to_context(const Eigen::MatrixXf& image) {
   IntensityScanContext context;
   context.rings = kRings;
   context.sectors = kSectors;
@@ -45,16 +46,16 @@ class PaperIsc final : public Baseline {
     options.levels = 0;
     options.max_range_m = 50.0;
     const IntensityScanContext context = revisit::describe(above, options);
-    Signature image(kRings, kSectors);  // column by column, as the context's cells
+    Eigen::MatrixXf image(kRings, kSectors);  // column by column, as the context's cells
     for (std::size_t cell = 0; cell < context.cells(); ++cell) {
       const bool is_occupied = (context.occupancy[cell / 64] >> (cell % 64) & 1u) != 0;
       image.data()[cell] = is_occupied ? static_cast<float>(context.intensity[cell]) : kEmpty;
     }
-    return image;
+    return {std::move(image), {}};
   }
 
   double similarity(const Signature& query, const Signature& place) const override {
-    const IntensityScanContext a = to_context(query), b = to_context(place);
+    const IntensityScanContext a = to_context(query.values), b = to_context(place.values);
     return match_descriptors(a, b).score();
   }
 };

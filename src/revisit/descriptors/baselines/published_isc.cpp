@@ -8,6 +8,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 #include <revisit/core/pose.hpp>
 #include <revisit/descriptors/internal/baselines.hpp>
@@ -21,7 +22,7 @@ constexpr float kMaxRange_m = 40.f, kLowest_m = -0.9f, kHighest_m = 30.f;
 int wrapped(int sector) { return (sector % kSectors + kSectors) % kSectors; }
 
 // Bits of the cells of each column that hold a value.
-std::array<std::uint32_t, kSectors> cells_that_hold(float value, const Baseline::Signature& image) {
+std::array<std::uint32_t, kSectors> cells_that_hold(float value, const Eigen::MatrixXf& image) {
   std::array<std::uint32_t, kSectors> masks{};
   for (int j = 0; j < kSectors; ++j)
     for (int i = 0; i < kRings; ++i) masks[static_cast<std::size_t>(j)] |= std::uint32_t{image(i, j) == value} << i;
@@ -34,7 +35,7 @@ class PublishedIsc final : public Baseline {
   std::string source() const override { return "Wang et al., ICRA 2020, as in the published program"; }
 
   Signature describe(std::span<const Point> points, double) const override {
-    Signature image = Signature::Zero(kRings, kSectors);
+    Eigen::MatrixXf image = Eigen::MatrixXf::Zero(kRings, kSectors);
     for (const Point& p : points) {
       const float range_m = std::hypot(p.x, p.y);
       if (range_m >= kMaxRange_m || p.z < kLowest_m || p.z > kHighest_m) continue;
@@ -43,10 +44,11 @@ class PublishedIsc final : public Baseline {
       const int sector = std::min(static_cast<int>(turns * kSectors), kSectors - 1);
       image(ring, sector) = std::max(image(ring, sector), std::floor(255.f * p.intensity));
     }
-    return image;
+    return {std::move(image), {}};
   }
 
-  double similarity(const Signature& query, const Signature& place) const override {
+  double similarity(const Signature& query_signature, const Signature& place_signature) const override {
+    const Eigen::MatrixXf &query = query_signature.values, &place = place_signature.values;
     const auto empty_q = cells_that_hold(0.f, query), empty_p = cells_that_hold(0.f, place);
     const auto one_q = cells_that_hold(1.f, query), one_p = cells_that_hold(1.f, place);
     int geometry = -1, best_shift = 0;

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "methods.hpp"
+
+#include <algorithm>
+#include <ctime>
+#include <utility>
+
+#include <oneapi/tbb/parallel_for.h>
+
+namespace revisit::cli {
+namespace {
+
+constexpr const char *kOurs = "revisit", *kPaper = "isc-paper";
+
+// Milliseconds that this thread has worked: other programs, and other methods beside, do not count.
+double worked_ms() {
+  std::timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
+}
+
+template <typename Work>
+double time_ms(Work work) {
+  const double begin = worked_ms();
+  work();
+  return worked_ms() - begin;
+}
+
+}  // namespace
+
+std::vector<std::string> Methods::names() {
+  std::vector<std::string> names{kOurs, kPaper};
+  for (const auto& baseline : make_baselines()) names.push_back(baseline->name());
+  return names;
+}
+
+Method& Methods::add(const std::string& name, const std::string& source) {
+  Method& method = *all_.emplace_back(std::make_unique<Method>());
+  method.report.name = name;
+  method.report.source = source;
+  return method;
+}
+
+Methods::Methods(const Options& options, const Parameters& parameters, const IntensityScale& scale)
+    : front_end_(parameters, scale, {}, {}) {
+  const auto is_wanted = [&](const std::string& name) {
+    return options.wanted.empty() ||
+           std::find(options.wanted.begin(), options.wanted.end(), name) != options.wanted.end();
+  };
+  const auto places = [&] { return std::make_unique<PlaceRecognition>(parameters, clouds_in_memory()); };
+  if (is_wanted(kOurs)) add(kOurs, "this program, with the parameters given").places_ = places();
+  if (is_wanted(kPaper)) {
+    Parameters as_printed = *preset("paper");
+    static_cast<ExclusionRule&>(as_printed.retrieval) = parameters.retrieval;
+    add(kPaper, "Wang et al., ICRA 2020, as in the paper (preset `paper`)").detector_ =
+        std::make_unique<LoopDetector>(as_printed, scale);
+  }
+  for (auto& baseline : make_baselines()) {
+    if (!is_wanted(baseline->name())) continue;
+    Method& method = add(baseline->name(), baseline->source());
+    method.baseline_ = std::make_unique<BaselineSearch>(std::move(baseline), parameters.retrieval);
+    if (!options.verifies_all) continue;
+    method.places_ = places();
+    method.places_->set_retrieval([&method](const PreparedScan&, std::size_t) {
+      return method.row_ && method.row_->match ? std::vector{*method.row_->match} : std::vector<FrameId>{};
+    });
+  }
+  for (auto& method : all_) method->report.gives_poses = method->places_ || method->detector_;
+}
+
+Status Methods::answer(const Scan& scan) {
+  const auto step = front_end_.step(scan);
+  const TypicalAgreement typical = front_end_.typical().recent();
+  std::vector<Status> statuses(all_.size(), ok());
+  tbb::parallel_for(std::size_t{0}, all_.size(),
+                    [&](std::size_t i) { statuses[i] = all_[i]->answer(scan, step ? &step->scan : nullptr, typical); });
+  const auto failed = std::find_if(statuses.begin(), statuses.end(), [](const Status& status) { return !status; });
+  return failed == statuses.end() ? ok() : *failed;
+}
+
+Status Method::open(const std::filesystem::path& folder, ResultWriter::Existing existing) {
+  auto writer = ResultWriter::create(folder, existing);
+  if (!writer) return writer.error();
+  writer_ = *std::move(writer);
+  return ok();
+}
+
+Status Method::answer(const Scan& raw, const PreparedScan* prepared, const TypicalAgreement& typical) {
+  Status status = ok();
+  one_thread_->execute([&] {
+    if (detector_) {
+      const auto detection = detector_->process(raw);
+      if (!detection) return;  // a scan that shows no place has no answer
+      report.retrieval_ms += detection->preparation_ms.describe + detection->search_ms;
+      report.verification_ms += detection->temporal_ms + detection->geometric_ms;
+      status = write(*detection, detection->row());
+      return;
+    }
+    if (!prepared) return;
+    if (baseline_) status = retrieve(*prepared);
+    if (status && places_) status = recognise(*prepared, typical);
+  });
+  return status;
+}
+
+Status Method::retrieve(const PreparedScan& scan) {
+  report.retrieval_ms += time_ms([&] {
+    row_ = baseline_->process({scan.scan.frame, scan.scan.stamp_s}, scan.scan.points, scan.ground_z_m);
+  });
+  report.bytes_a_place = baseline_->bytes_a_place();
+  return row_ ? writer_->add(*row_) : ok();
+}
+
+Status Method::recognise(const PreparedScan& scan, const TypicalAgreement& typical) {
+  const std::size_t searchable = places_->index().searchable({scan.scan.frame, scan.scan.stamp_s});
+  Result<Detection> detection = Detection{};
+  const double worked = time_ms([&] { detection = places_->find(scan, searchable, typical); });
+  if (!detection) return detection.error();
+  if (!baseline_) {
+    report.retrieval_ms += scan.ms.describe + detection->search_ms;
+    report.bytes_a_place = scan.descriptor.intensity.size() + scan.descriptor.occupancy.size() * sizeof(std::uint64_t);
+  }
+  report.verification_ms += baseline_ ? worked : std::max(0.0, worked - detection->search_ms);
+  const Status written = write(*detection, baseline_ ? std::nullopt : std::optional(detection->row()));
+  if (!written) return written;
+  return places_->add(scan);
+}
+
+Status Method::write(const Detection& detection, const std::optional<CandidateRow>& row) {
+  if (detection.searchable_places == 0) return ok();
+  if (row)
+    if (const Status status = writer_->add(*row); !status) return status;
+  return detection.loop ? writer_->add(*detection.loop) : ok();
+}
+
+}  // namespace revisit::cli

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <oneapi/tbb/task_arena.h>
+
+#include <revisit/io/result_files.hpp>
+#include <revisit/pipeline/detection_front_end.hpp>
+#include <revisit/pipeline/loop_detector.hpp>
+#include <revisit/pipeline/place_recognition.hpp>
+#include <revisit/retrieval/baseline_search.hpp>
+
+#include "reports/comparison.hpp"
+
+namespace revisit::cli {
+
+/// A method of `revisit compare` at work, on one thread: what it answers goes into a folder of its own, in the form of
+/// `revisit detect`.
+class Method {
+ public:
+  MethodReport report;  ///< what it cost is added up meanwhile
+
+  /// `raw` as the recording has it; `prepared`: null where the scan describes no place.
+  Status answer(const Scan& raw, const PreparedScan* prepared, const TypicalAgreement& typical);
+  Status open(const std::filesystem::path& folder, ResultWriter::Existing existing);
+  Status finish() { return writer_->finish(); }
+
+ private:
+  friend class Methods;
+  Status retrieve(const PreparedScan& scan);
+  Status recognise(const PreparedScan& scan, const TypicalAgreement& typical);
+  Status write(const Detection& detection, const std::optional<CandidateRow>& row);
+
+  // What it is made of: a retrieval of its own, and this program's places; a baseline alone; or a whole detector.
+  std::unique_ptr<BaselineSearch> baseline_;
+  std::unique_ptr<PlaceRecognition> places_;
+  std::unique_ptr<LoopDetector> detector_;
+  std::optional<CandidateRow> row_;  ///< of the baseline
+  std::optional<ResultWriter> writer_;
+  std::unique_ptr<tbb::task_arena> one_thread_ = std::make_unique<tbb::task_arena>(1);
+};
+
+/// Those that are wanted, and what comes before all of them.
+class Methods {
+ public:
+  struct Options {
+    std::vector<std::string> wanted;  ///< empty: all
+    bool verifies_all = false;        ///< what baselines answer is registered as this program does
+  };
+  static std::vector<std::string> names();
+  Methods(const Options& options, const Parameters& parameters, const IntensityScale& scale);
+
+  /// Gives the scan to each, several at once.
+  Status answer(const Scan& scan);
+  std::vector<std::unique_ptr<Method>>& all() { return all_; }
+
+ private:
+  Method& add(const std::string& name, const std::string& source);
+
+  DetectionFrontEnd front_end_;
+  std::vector<std::unique_ptr<Method>> all_;
+};
+
+}  // namespace revisit::cli

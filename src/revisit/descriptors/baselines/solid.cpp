@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// Kim, Choi, Sim, Kim and Cho, "Narrowing your FOV with SOLiD: Spatially Organized and Lightweight Global Descriptor
+// for FOV-constrained LiDAR Place Recognition", RA-L 2024: points are counted by range and elevation (40 x 32, from 3
+// to 80 m, one a voxel of 0.4 m); elevations are weighted by how many points they hold, from 0 to 1; the weighted
+// counts of the ranges are the descriptor, compared by cosine. Elevations reach from -25 to 15 degrees here, for all
+// sensors (in the authors' program they are set to the sensor's).
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <revisit/core/pose.hpp>
+#include <revisit/descriptors/internal/baselines.hpp>
+
+namespace revisit::descriptors_internal {
+namespace {
+
+constexpr int kRanges = 40, kElevations = 32;
+constexpr float kNearest_m = 3.f, kFarthest_m = 80.f, kVoxel_m = 0.4f;
+constexpr double kLowest_deg = -25.0, kHighest_deg = 15.0;
+
+// Whether a voxel is met for the first time.
+class Voxels {
+ public:
+  bool is_new(const Point& p) {
+    const auto cell = [](float metres, int cells) {
+      return static_cast<std::size_t>(
+          std::clamp(static_cast<int>(std::floor(metres / kVoxel_m)) + cells / 2, 0, cells - 1));
+    };
+    auto&& bit = met_[(cell(p.x, kAcross) * kAcross + cell(p.y, kAcross)) * kUp + cell(p.z, kUp)];
+    if (bit) return false;
+    return bit = true;
+  }
+
+ private:
+  static constexpr int kAcross = 400, kUp = 128;
+  std::vector<bool> met_ = std::vector<bool>(std::size_t{kAcross} * kAcross * kUp);
+};
+
+class Solid final : public Baseline {
+ public:
+  std::string name() const override { return "solid"; }
+  std::string source() const override { return "Kim et al., RA-L 2024"; }
+
+  Signature describe(std::span<const Point> points, double) const override {
+    Eigen::MatrixXf counts = Eigen::MatrixXf::Zero(kRanges, kElevations);
+    Voxels voxels;
+    for (const Point& p : points) {
+      const float range_m = std::hypot(p.x, p.y);
+      if (range_m < kNearest_m || range_m >= kFarthest_m || !voxels.is_new(p)) continue;
+      const double elevation_deg = std::atan2(p.z, range_m) * 180.0 / kPi;
+      const auto elevation =
+          static_cast<int>(std::floor((elevation_deg - kLowest_deg) / (kHighest_deg - kLowest_deg) * kElevations));
+      const auto range = static_cast<int>(range_m / kFarthest_m * kRanges);
+      if (elevation >= 0 && elevation < kElevations) counts(range, elevation) += 1.f;
+    }
+    Eigen::VectorXf weights = counts.colwise().sum();
+    const float least = weights.minCoeff(), span = weights.maxCoeff() - least;
+    if (span > 0.f) weights = (weights.array() - least) / span;
+    return {counts * weights, {}};
+  }
+
+  double similarity(const Signature& query, const Signature& place) const override {
+    const auto lengths = static_cast<double>(query.values.norm() * place.values.norm());
+    return lengths > 0.0 ? static_cast<double>(query.values.col(0).dot(place.values.col(0))) / lengths : 0.0;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Baseline> make_solid() { return std::make_unique<Solid>(); }
+
+}  // namespace revisit::descriptors_internal

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include <revisit/odometry/odometry.hpp>
+#include <revisit/pipeline/prepare.hpp>
+#include <revisit/verification/typical_agreement.hpp>
+
+namespace revisit {
+
+/// The half of loop detection that comes before places: odometry says how the sensor moved, the scan is made ready, and
+/// what scans of one place typically agree in is learnt. Frames increase. Belongs to one thread at a time.
+class DetectionFrontEnd {
+ public:
+  /// Without a `scale`, the first ten scans decide it. Throws std::invalid_argument for parameters out of range.
+  DetectionFrontEnd(const Parameters& parameters, const std::optional<IntensityScale>& scale,
+                    IntensityCalibration calibration, LogSink log);
+
+  struct Step {
+    PreparedScan scan;  ///< with its geometry and trajectory point
+    double odometry_ms = 0.0;
+  };
+  /// An error says why the scan describes no place; the next one may.
+  Result<Step> step(Scan scan);
+  /// A scan by itself: nobody knows how the sensor moved.
+  Result<PreparedScan> prepare(Scan scan) { return preparation_.prepare(std::move(scan)); }
+
+  const TypicalAgreementEstimate& typical() const { return typical_; }
+
+ private:
+  TrajectoryPoint next_point(const OdometryStep& step, PreparedScan& prepared);
+
+  Parameters parameters_;
+  Odometry odometry_;
+  ScanPreparation preparation_;
+  TypicalAgreementEstimate typical_;
+  TrajectoryPoint point_;  ///< of the last scan
+  struct Tracked {
+    TrajectoryPoint point;
+    int segment = 0;  ///< of odometry
+    Pose T_odom_lidar = Pose::Identity();
+  };
+  std::optional<Tracked> tracked_;                ///< the last scan that odometry tracked
+  int origins_ = 0;                               ///< of trajectory points, so far
+  std::shared_ptr<const ScanGeometry> previous_;  ///< likewise; null where it described no place
+};
+
+}  // namespace revisit
