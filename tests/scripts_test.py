@@ -35,6 +35,7 @@ class Scripts(unittest.TestCase):
         self.assertIn("poses/07.txt (of data_odometry_poses.zip)", absent.stderr)
         (data / "poses").mkdir()
         shutil.move(sequence / "poses.txt", data / "poses" / "07.txt")
+        (sequence / "velodyne" / "000007.bin").write_bytes(b"broken")
         done = run(SCRIPTS / "datasets" / "kitti.sh", data, out, "07")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("30 of 1101 scans", done.stderr)
@@ -47,7 +48,7 @@ class Scripts(unittest.TestCase):
         for i, (a, b) in enumerate([(0.9, 0.5), (0.8, 0.85), (0.95, 0.4), (0.9, 0.6)]):
             folder = self.folder / str(i)
             folder.mkdir()
-            (folder / "comparison.csv").write_text(f"method,recall_at_1,recall\na,{a},\nb,{b},0.5\n")
+            (folder / "comparison.csv").write_text(f"method,recall_at_1,recall,false_loops\na,{a},,3\nb,{b},0.5,1\n")
             folders.append(folder)
         ranked = run(SCRIPTS / "rank_methods.py", *folders)
         self.assertEqual(ranked.returncode, 0, ranked.stderr)
@@ -56,6 +57,9 @@ class Scripts(unittest.TestCase):
         self.assertEqual(lines[3].split()[0], "b")
         self.assertGreater(float(lines[2].split()[-2]), 95.0)
         self.assertEqual(run(SCRIPTS / "rank_methods.py", *folders[:2]).returncode, 2)
+        less = run(SCRIPTS / "rank_methods.py", "--figure", "false_loops", *folders)
+        self.assertEqual(less.stdout.splitlines()[2].split()[0], "b", "fewer are better")
+        self.assertIn("left out: a, without recall", run(SCRIPTS / "rank_methods.py", "--figure", "recall", *folders).stderr)
         self.assertIn("allowed:", run(SCRIPTS / "rank_methods.py", "--figure", "x", *folders).stderr)
 
 

@@ -74,7 +74,9 @@ MapCloud to_map_cloud(const Settings& settings, const std::vector<Point>& points
   for (std::size_t i = 0; i < points.size(); i += step) add(cloud.overview, points[i]);
   std::map<std::pair<int, int>, std::vector<float>> tiles;
   const auto tile = [](float metres) { return static_cast<int>(std::floor(metres / MapCloud::kTileM)); };
-  for (const Point& p : points) add(tiles[{tile(p.x), tile(p.y)}], p);
+  constexpr float kFarthest_m = 1e6f;  // nothing is there, and the number of a tile must fit
+  for (const Point& p : points)
+    if (std::abs(p.x) < kFarthest_m && std::abs(p.y) < kFarthest_m) add(tiles[{tile(p.x), tile(p.y)}], p);
   cloud.tiles.reserve(tiles.size());
   for (auto& [where, inside] : tiles) cloud.tiles.push_back(std::move(inside));
   return cloud;

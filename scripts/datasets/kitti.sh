@@ -9,10 +9,10 @@
 # A sequence takes some minutes to half an hour on two cores. What is there already is not run again.
 set -euo pipefail
 usage="usage: scripts/datasets/kitti.sh FOLDER OUT [SEQUENCE ...]"
-folder=$(realpath "${1:?$usage}") out=$(realpath -m "${2:?$usage}")
+folder=$(realpath "${1:?$usage}")
+out=$(realpath -m "${2:?$usage}")
 shift 2
-cd "$(dirname "$0")/../.."
-revisit=${REVISIT:-build/revisit}
+revisit=$(realpath -m "${REVISIT:-$(dirname "$0")/../../build/revisit}")
 [ $# -gt 0 ] || set -- 00 02 05 06 07 08
 declare -A scans=([00]=4541 [01]=1101 [02]=4661 [03]=801 [04]=271 [05]=2761 [06]=1101 [07]=1101 [08]=4071 [09]=1591 [10]=1201)
 
@@ -37,16 +37,19 @@ for sequence in "$@"; do
 done
 [ $missing = 0 ] || exit 1
 
+# 3: done, but for some scans (`revisit --help`).
+run() { "$@" > /dev/null || [ $? = 3 ]; }
 mkdir -p "$out"
 for sequence in "$@"; do
   of=$folder/sequences/$sequence poses=$folder/poses/$sequence.txt to=$out/$sequence
+  found=$(find "$of/velodyne" -name '*.bin' -size +0 | wc -l)
+  # Finished, and with as many scans as there are now.
+  [ "$(cat "$to/scans.txt" 2> /dev/null)" != "$found" ] || continue
   echo "== $sequence" >&2
-  [ -e "$to/comparison.txt" ] || "$revisit" compare "$of" --poses "$poses" --verify --out "$to" --overwrite > /dev/null
-  [ -e "$to/slam.txt" ] || {
-    "$revisit" slam "$of" --no-map --out "$to/slam" --overwrite > /dev/null
-    "$revisit" evaluate "$to/slam" --reference "$poses" > "$to/slam.part"
-    mv "$to/slam.part" "$to/slam.txt"
-  }
+  run "$revisit" compare "$of" --poses "$poses" --verify --out "$to" --overwrite
+  run "$revisit" slam "$of" --no-map --out "$to/slam" --overwrite
+  "$revisit" evaluate "$to/slam" --reference "$poses" > "$to/slam.txt"
+  echo "$found" > "$to/scans.txt"
 done
 for sequence in "$@"; do
   printf '== %s\n' "$sequence"

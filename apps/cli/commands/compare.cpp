@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cctype>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -100,6 +101,8 @@ int compare(const CompareOptions& options) {
   use_frames_alone_without_times(**recording, *parameters);
   const auto scale = intensity_scale_of(**recording, parameters->intensity);
   if (!scale) return fail({scale.error().message + "; no scan can be used"});
+  for (const std::string& each : options.candidates)  // not after hours
+    if (const auto rows = read_candidates(each.substr(each.find('=') + 1)); !rows) return fail(rows.error());
   Methods methods({options.methods, options.verify}, *parameters, *scale);
   for (const auto& method : methods.all())
     if (const Status status =
@@ -137,8 +140,9 @@ Run add_compare(CLI::App& program) {
       "Prints tables 1 and 2 (docs/evaluation.md) with a row a method, judged by the poses of the recording, and "
       "writes\n"
       "comparison.txt, .csv, .tex, .json, precision_recall.png and a folder a method with its candidates.csv and\n"
-      "loops.csv. Each method takes the same scans, prepared in the same way (ground, intensity, sweep), may answer\n"
-      "with the same earlier ones, and works on one thread. Methods of your own: a candidates.csv (docs/formats.md)\n"
+      "loops.csv. Each method takes the same scans, prepared in the same way (ground, intensity, sweep; isc-paper by\n"
+      "its own preset), may answer with the same earlier ones, and works on one thread. Methods of your own: a "
+      "candidates.csv (docs/formats.md)\n"
       "of any program with --candidates, or revisit.compare(own=...) in Python.\n\n"
       "Methods:\n"
       "  revisit                this program, with the parameters given\n"
@@ -159,7 +163,13 @@ Run add_compare(CLI::App& program) {
                    "NAME=FILE: judge the candidates.csv of another program beside them; may be repeated")
       ->check([](const std::string& text) {
         const std::size_t equals = text.find('=');
-        return equals == std::string::npos || equals == 0 ? "NAME=FILE is wanted" : std::string();
+        if (equals == std::string::npos || equals == 0) return std::string("NAME=FILE is wanted");
+        const std::string name = text.substr(0, equals);
+        if (std::any_of(name.begin(), name.end(),
+                        [](unsigned char c) { return std::isalnum(c) == 0 && c != '-' && c != '+' && c != '.'; }))
+          return name + ": allowed in a name: letters, digits, - + .";
+        const std::vector<std::string> taken = Methods::names();
+        return std::find(taken.begin(), taken.end(), name) == taken.end() ? std::string() : name + ": is taken";
       });
   command->add_option("--poses", options->poses, "Pose file (KITTI, TUM, g2o), instead of the recording's own poses");
   command->add_flag("--overwrite", options->overwrite, "Replace results that are already in the folder");

@@ -63,16 +63,25 @@ std::string to_csv(const std::vector<MethodReport>& methods) {
       "method,revisits,recall_at_1,f1_max,average_precision,recall_at_p100,extended_precision,reverse_revisits,"
       "reverse_recall_at_1,reverse_recall_at_p100,accepted,false_loops,recall,reverse_recall,median_translation_m,"
       "median_rotation_deg,retrieval_ms,verification_ms,bytes_a_place\n";
+  // Empty where there is nothing to count.
+  const auto number = [](double value, bool is_there) { return is_there ? format(",%.6f", value) : std::string(","); };
   for (const MethodReport& method : methods) {
     const RetrievalTable &all = method.evaluation.retrieval, &reverse = method.evaluation.reverse_retrieval;
     const LoopTable& t = method.evaluation.loops;
-    text += method.name + format(",%zu,%.6f,%.6f,%.6f,%.6f,%.6f,%zu,%.6f,%.6f", all.revisits, all.recall_at_1,
-                                 all.f1_max, all.average_precision, all.recall_at_p100, all.extended_precision,
-                                 reverse.revisits, reverse.recall_at_1, reverse.recall_at_p100);
-    text += method.gives_poses ? format(",%zu,%zu,%.6f,%.6f,%.6f,%.6f", t.accepted, t.false_loops, t.recall,
-                                        t.reverse_recall, t.median_translation_m, t.median_rotation_deg)
-                               : ",,,,,,";
-    text += format(",%.6f,%.6f,%zu\n", method.retrieval_ms, method.verification_ms, method.bytes_a_place);
+    text += method.name + "," + std::to_string(all.revisits);
+    for (const double value :
+         {all.recall_at_1, all.f1_max, all.average_precision, all.recall_at_p100, all.extended_precision})
+      text += number(value, all.revisits > 0);
+    text += "," + std::to_string(reverse.revisits) + number(reverse.recall_at_1, reverse.revisits > 0) +
+            number(reverse.recall_at_p100, reverse.revisits > 0);
+    text += method.gives_poses ? format(",%zu,%zu", t.accepted, t.false_loops) : std::string(",,");
+    text += number(t.recall, method.gives_poses && t.revisits > 0) +
+            number(t.reverse_recall, method.gives_poses && t.reverse_revisits > 0) +
+            number(t.median_translation_m, method.gives_poses && t.accepted > 0) +
+            number(t.median_rotation_deg, method.gives_poses && t.accepted > 0) +
+            number(method.retrieval_ms, method.retrieval_ms > 0.0) +
+            number(method.verification_ms, method.verification_ms > 0.0) +
+            (method.bytes_a_place > 0 ? "," + std::to_string(method.bytes_a_place) : ",") + "\n";
   }
   return text;
 }

@@ -199,6 +199,19 @@ struct BigCloud {
   PointCloud2 message{};
 };
 
+// The tiles of a map: whoever comes late gets all that were written, not only the last.
+TEST(Dds, WhoComesLateHearsAllThatIsLatched) {
+  constexpr int kTiles = 10;
+  const Writer<PathMessage> writer(participant(), "/latched", Quality::kLatched, kTiles);
+  for (int i = 0; i < kTiles; ++i) {
+    PathMessage message{};
+    message.header = {time_of(i), text("map")};
+    writer.write(message);
+  }
+  Heard<PathMessage> late("/latched", Quality::kLatched, [](const PathMessage&) {});
+  EXPECT_TRUE(late.wait_for(kTiles, 10s)) << late.count() << " of " << kTiles;
+}
+
 TEST(Dds, BigCloudsComeInAndPosesComeOut) {
   constexpr int kScans = 20;
   const SyntheticWorld world(61);

@@ -38,7 +38,7 @@ REVISIT_DDS_TYPE(LoopMessage, revisit_ros_msg_dds__Loop_)
 enum class Quality : std::uint8_t {
   kSensorData,  ///< best effort, the last 5
   kReliable,    ///< reliable, the last 100
-  kLatched      ///< reliable, the last one of a writer, for those that come later, too
+  kLatched      ///< reliable; the last ones of a writer (one, or as many as it says) for those that come later, too
 };
 
 inline dds_entity_t require(dds_entity_t entity, const std::string& what) {
@@ -54,6 +54,8 @@ inline std::unique_ptr<dds_qos_t, void (*)(dds_qos_t*)> qos_of(Quality quality, 
   const int depth = !is_reliable ? 5 : is_latched && is_writer ? latched_messages : kReliableDepth;
   dds_qset_reliability(qos.get(), is_reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, DDS_MSECS(100));
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth);
+  dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, depth, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED,
+                              DDS_LENGTH_UNLIMITED);  // what those get that come later
   dds_qset_durability(qos.get(), is_latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   return qos;
 }
@@ -69,16 +71,19 @@ template <typename Message>
 class Writer {
  public:
   Writer(dds_entity_t participant, const std::string& name, Quality quality, int latched_messages = 1)
-      : writer_(require(dds_create_writer(participant, make_topic<Message>(participant, name),
-                                          qos_of(quality, true, latched_messages).get(), nullptr),
+      : topic_(make_topic<Message>(participant, name)),
+        writer_(require(dds_create_writer(participant, topic_, qos_of(quality, true, latched_messages).get(), nullptr),
                         name)) {}
-  ~Writer() { dds_delete(writer_); }
+  ~Writer() {
+    dds_delete(writer_);
+    dds_delete(topic_);
+  }
   Writer(const Writer&) = delete;
   Writer& operator=(const Writer&) = delete;
   void write(const Message& message) const { (void)dds_write(writer_, &message); }
 
  private:
-  dds_entity_t writer_;
+  dds_entity_t topic_, writer_;
 };
 
 /// Calls `use` with each message, from a thread of DDS. The message lives as long as the pointer.

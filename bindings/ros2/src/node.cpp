@@ -129,6 +129,7 @@ class RevisitNode final : public rclcpp_lifecycle::LifecycleNode, public node::O
     path_ = rclcpp::create_publisher<Ros2::Path>(*this, "~/path", latched);
     graph_ = rclcpp::create_publisher<Ros2::MarkerArray>(*this, "~/graph", latched);
     map_ = rclcpp::create_publisher<PointCloud2>(*this, "~/map_cloud", latched);
+    tiles_.reset();
     tf_ = rclcpp::create_publisher<tf2_msgs::msg::TFMessage>(*this, "/tf", 100);
     diagnostics_ = rclcpp::create_publisher<Ros2::DiagnosticArray>(*this, "/diagnostics", 10);
     node::Settings settings;

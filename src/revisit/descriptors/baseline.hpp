@@ -35,8 +35,12 @@ class Baseline {
   virtual std::string name() const = 0;    ///< as the command line and the tables say it
   virtual std::string source() const = 0;  ///< the paper
 
-  /// `points`: one scan, metres, LiDAR frame, intensity in [0, 1]; `ground_z_m`: where the ground lies in that frame.
+  /// `points`: one scan, finite, metres, LiDAR frame, intensity in [0, 1]; `ground_z_m`: where the ground lies in that
+  /// frame.
   virtual Signature describe(std::span<const Point> points, double ground_z_m) const = 0;
+
+  /// What of a signature is kept once the scan is a place.
+  virtual Signature kept(Signature signature) const { return signature; }
 
   /// How alike two places are; larger is more alike, the scale is the method's own.
   virtual double similarity(const Signature& query, const Signature& place) const = 0;

@@ -58,6 +58,12 @@ TEST_P(EachBaseline, APlaceIsMostLikeItself) {
   const auto a = method->describe(made_place(1), -1.7), b = method->describe(made_place(2), -1.7);
   EXPECT_GT(method->similarity(a, a), method->similarity(a, b));
   EXPECT_TRUE(method->describe({}, -1.7).values.allFinite());
+  auto far = made_place(1);
+  far.push_back({1e10f, 3.f, 1.f, 0.f});
+  far.push_back({3.f, -1e10f, 1e10f, 0.f});
+  if (method->name() != "m2dp") {  // which centres the cloud
+    EXPECT_GT(method->similarity(method->describe(far, -1.7), a), 0.99 * method->similarity(a, a));
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, EachBaseline, testing::Range(std::size_t{0}, make_baselines().size()),

@@ -49,6 +49,7 @@ std::optional<CandidateRow> BaselineSearch::process(const FrameTime& query_frame
     row->score = *best;
     row->reason = to_text(Refusal{Refusal::Reason::kNoPose});
   }
+  query.signature = method_->kept(std::move(query.signature));
   bytes_ += query.signature.bytes() + static_cast<std::size_t>(query.key.size()) * sizeof(float);
   places_.push_back(std::move(query));
   return row;

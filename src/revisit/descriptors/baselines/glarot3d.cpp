@@ -3,15 +3,12 @@
 // between all pairs of keypoints are counted by length and direction, directions by the cells of a cube around a
 // sphere; two histograms are compared by L1 distance at the best rotation. What the paper leaves open is chosen here:
 // keypoints are the 100 most upright things (cells of 1 m with the most height in them among their neighbours, up to 50
-// m away), lengths have 20 bins of 2 m, a face of the cube 4 x 4 cells; rotations are those about the vertical by a
-// cell of the cube (22.5 degrees), since what carries the sensor drives.
+// m away), lengths have 20 bins of 2 m, an upright face of the cube 4 x 4 cells, the others one; rotations are those
+// about the vertical by a cell of the cube (22.5 degrees), since what carries the sensor drives.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 #include <vector>
-
-#include <Eigen/Geometry>
 
 #include <revisit/core/pose.hpp>
 #include <revisit/descriptors/internal/baselines.hpp>
@@ -19,8 +16,8 @@
 namespace revisit::descriptors_internal {
 namespace {
 
-constexpr int kCells = 100, kAround = 2, kKeypoints = 100, kLengths = 20, kFace = 4, kDirections = 6 * kFace * kFace;
-constexpr int kTurns = 4 * kFace;
+constexpr int kCells = 100, kAround = 2, kKeypoints = 100, kLengths = 20, kFace = 4, kTurns = 4 * kFace;
+constexpr Eigen::Index kSides = kTurns * kFace, kDirections = kSides + 2;
 constexpr float kLeastHeight_m = 1.f, kLength_m = 2.f;
 
 std::vector<Eigen::Vector3f> keypoints_of(std::span<const Point> points, float ground_z_m) {
@@ -32,8 +29,9 @@ std::vector<Eigen::Vector3f> keypoints_of(std::span<const Point> points, float g
   std::vector<Column> columns(std::size_t{kCells} * kCells);
   const auto cell = [](float metres) { return static_cast<int>(std::floor(metres)) + kCells / 2; };
   for (const Point& p : points) {
+    constexpr float kReach_m = kCells / 2.f;
+    if (!(std::abs(p.x) < kReach_m) || !(std::abs(p.y) < kReach_m)) continue;
     const int i = cell(p.x), j = cell(p.y);
-    if (std::min(i, j) < 0 || std::max(i, j) >= kCells) continue;
     Column& column = columns[static_cast<std::size_t>(i * kCells + j)];
     const float up = p.z - ground_z_m;
     column.low = column.count > 0.f ? std::min(column.low, up) : up;
@@ -67,36 +65,17 @@ std::vector<Eigen::Vector3f> keypoints_of(std::span<const Point> points, float g
   return keypoints;
 }
 
-// The cell of the cube that a direction meets, and the middle of a cell.
-int cell_of(const Eigen::Vector3f& direction) {
-  Eigen::Index axis = 0;
-  const float length = direction.cwiseAbs().maxCoeff(&axis);
-  const int face = 2 * static_cast<int>(axis) + (direction[axis] < 0.f);
-  const auto cell = [&](Eigen::Index i) {
-    return std::clamp(static_cast<int>((direction[(axis + i) % 3] / length + 1.f) * kFace / 2), 0, kFace - 1);
-  };
-  return (face * kFace + cell(1)) * kFace + cell(2);
-}
-Eigen::Vector3f middle_of(int cell) {
-  const int face = cell / (kFace * kFace), axis = face / 2;
-  const auto place = [](int i) { return (static_cast<float>(i) + 0.5f) * 2.f / kFace - 1.f; };
-  Eigen::Vector3f direction;
-  direction[axis] = face % 2 == 0 ? 1.f : -1.f;
-  direction[(axis + 1) % 3] = place(cell / kFace % kFace);
-  direction[(axis + 2) % 3] = place(cell % kFace);
-  return direction;
-}
-
-// Which cell each becomes, for each turn about the vertical.
-std::array<std::array<Eigen::Index, kDirections>, kTurns> make_turns() {
-  std::array<std::array<Eigen::Index, kDirections>, kTurns> turned{};
-  for (int turn = 0; turn < kTurns; ++turn)
-    for (int cell = 0; cell < kDirections; ++cell) {
-      const auto angle = static_cast<float>(2.0 * kPi * turn / kTurns);
-      turned[static_cast<std::size_t>(turn)][static_cast<std::size_t>(cell)] =
-          cell_of(Eigen::AngleAxisf(angle, Eigen::Vector3f::UnitZ()) * middle_of(cell));
-    }
-  return turned;
+// The cell of the cube that a direction meets: those of the four upright faces column by column, counter-clockwise,
+// then the lid and the floor, which are one cell each.
+Eigen::Index cell_of(const Eigen::Vector3f& direction) {
+  const float across = direction.head<2>().cwiseAbs().maxCoeff();
+  if (std::abs(direction.z()) > across) return kSides + (direction.z() < 0.f);
+  const bool is_along_x = std::abs(direction.x()) == across;
+  const float forward = is_along_x ? direction.x() : direction.y(), left = is_along_x ? direction.y() : -direction.x();
+  const int face = (is_along_x ? 0 : 1) + (forward < 0.f ? 2 : 0);
+  const auto cell = [](float share) { return std::clamp(static_cast<int>((share + 1.f) * kFace / 2), 0, kFace - 1); };
+  const int column = face * kFace + cell(left / forward), row = cell(direction.z() / across);
+  return Eigen::Index{column} * kFace + row;
 }
 
 class Glarot3d final : public Baseline {
@@ -120,19 +99,17 @@ class Glarot3d final : public Baseline {
 
   // 1 - half the L1 distance: the share that both have.
   double similarity(const Signature& query, const Signature& place) const override {
+    const float above = (query.values.rightCols<2>() - place.values.rightCols<2>()).cwiseAbs().sum();
     float least = 2.f;
-    for (const auto& turned : turns_) {
-      float difference = 0.f;
-      for (Eigen::Index cell = 0; cell < kDirections; ++cell)
-        difference +=
-            (query.values.col(cell) - place.values.col(turned[static_cast<std::size_t>(cell)])).cwiseAbs().sum();
+    for (Eigen::Index turn = 0; turn < kTurns; ++turn) {
+      const Eigen::Index shift = turn * kFace, rest = kSides - shift;
+      const float difference = above +
+                               (query.values.leftCols(rest) - place.values.middleCols(shift, rest)).cwiseAbs().sum() +
+                               (query.values.middleCols(rest, shift) - place.values.leftCols(shift)).cwiseAbs().sum();
       least = std::min(least, difference);
     }
     return 1.0 - static_cast<double>(least) / 2.0;
   }
-
- private:
-  const std::array<std::array<Eigen::Index, kDirections>, kTurns> turns_ = make_turns();
 };
 
 }  // namespace

@@ -37,12 +37,12 @@ Eigen::MatrixXf image_of(std::span<const Point> points, float ground_z_m) {
   Eigen::Matrix<std::uint8_t, kRanges, Eigen::Dynamic> heights(kRanges, kAzimuths);
   heights.setZero();
   for (const Point& p : points) {
-    const auto range = static_cast<int>(std::hypot(p.x, p.y));
+    const float range_m = std::hypot(p.x, p.y);
+    if (!(range_m < kRanges) || !std::isfinite(p.z)) continue;
     const auto azimuth = static_cast<int>((std::atan2(p.y, p.x) / static_cast<float>(kPi) + 1.f) * kAzimuths / 2);
-    const auto height = static_cast<int>(std::floor(p.z - ground_z_m + kBelowGround_m));
-    if (range < kRanges)
-      heights(range, std::min(azimuth, kAzimuths - 1)) |=
-          static_cast<std::uint8_t>(1u << std::clamp(height, 0, kHeights - 1));
+    const float height = std::clamp(std::floor(p.z - ground_z_m + kBelowGround_m), 0.f, kHeights - 1.f);
+    heights(static_cast<int>(range_m), std::min(azimuth, kAzimuths - 1)) |=
+        static_cast<std::uint8_t>(1u << static_cast<unsigned>(height));
   }
   return heights.cast<float>();
 }

@@ -25,8 +25,8 @@ std::vector<Eigen::Vector2f> occupied_cells(std::span<const Point> points, float
   const auto cell = [](float metres) { return static_cast<int>(std::floor((metres / kReach_m + 1.f) * kCells / 2)); };
   const auto centre = [](int i) { return (static_cast<float>(i) + 0.5f) * 2.f / kCells - 1.f; };
   for (const Point& p : points) {
-    const int i = cell(p.x), j = cell(p.y);
-    if (p.z < lowest_m || std::min(i, j) < 0 || std::max(i, j) >= kCells) continue;
+    if (p.z < lowest_m || !(std::abs(p.x) < kReach_m) || !(std::abs(p.y) < kReach_m)) continue;
+    const int i = std::clamp(cell(p.x), 0, kCells - 1), j = std::clamp(cell(p.y), 0, kCells - 1);
     const auto index = static_cast<std::size_t>(i * kCells + j);
     if (is_occupied[index]) continue;
     is_occupied[index] = true;

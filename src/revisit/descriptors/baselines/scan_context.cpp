@@ -70,7 +70,7 @@ Eigen::MatrixXf polar_heights(std::span<const Point> points, double ground_z_m, 
   for (const Point& p : points) {
     const float y = p.y - left_m;
     const float range_m = std::hypot(p.x, y);
-    if (range_m >= kMaxRange_m) continue;
+    if (!(range_m < kMaxRange_m)) continue;
     const int ring = static_cast<int>(range_m * kRings / kMaxRange_m);
     const float turns = (std::atan2(y, p.x) + static_cast<float>(kPi)) / static_cast<float>(2.0 * kPi);
     const int sector = std::min(static_cast<int>(turns * kSectors), kSectors - 1);

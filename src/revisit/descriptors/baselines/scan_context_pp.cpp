@@ -60,8 +60,12 @@ class ScanContextPlusPlus final : public Baseline {
     return signature;
   }
 
+  Signature kept(Signature signature) const override {
+    return {signature.values.leftCols(signature.values.cols() / static_cast<Eigen::Index>(kLeft_m.size())), {}};
+  }
+
   double similarity(const Signature& query, const Signature& place) const override {
-    const Eigen::Index sectors = place.values.cols() / static_cast<Eigen::Index>(kLeft_m.size());
+    const Eigen::Index sectors = query.values.cols() / static_cast<Eigen::Index>(kLeft_m.size());
     const Eigen::MatrixXf own = place.values.leftCols(sectors);
     const Eigen::VectorXf own_key = own.colwise().mean(), own_scale = inverse_lengths(own);
     double best = 0.0;

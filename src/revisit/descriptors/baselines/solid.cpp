@@ -23,8 +23,8 @@ class Voxels {
  public:
   bool is_new(const Point& p) {
     const auto cell = [](float metres, int cells) {
-      return static_cast<std::size_t>(
-          std::clamp(static_cast<int>(std::floor(metres / kVoxel_m)) + cells / 2, 0, cells - 1));
+      return static_cast<std::size_t>(std::clamp(std::floor(metres / kVoxel_m) + static_cast<float>(cells / 2), 0.f,
+                                                 static_cast<float>(cells - 1)));
     };
     auto&& bit = met_[(cell(p.x, kAcross) * kAcross + cell(p.y, kAcross)) * kUp + cell(p.z, kUp)];
     if (bit) return false;
@@ -46,7 +46,7 @@ class Solid final : public Baseline {
     Voxels voxels;
     for (const Point& p : points) {
       const float range_m = std::hypot(p.x, p.y);
-      if (range_m < kNearest_m || range_m >= kFarthest_m || !voxels.is_new(p)) continue;
+      if (!(range_m >= kNearest_m && range_m < kFarthest_m) || !std::isfinite(p.z) || !voxels.is_new(p)) continue;
       const double elevation_deg = std::atan2(p.z, range_m) * 180.0 / kPi;
       const auto elevation =
           static_cast<int>(std::floor((elevation_deg - kLowest_deg) / (kHighest_deg - kLowest_deg) * kElevations));
