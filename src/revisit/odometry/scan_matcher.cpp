@@ -95,7 +95,7 @@ class ScanMatcher::Insertion {
   }
 
  private:
-  tbb::task_arena arena_;
+  tbb::task_arena arena_{2};  // whoever waits, and one more
   tbb::task_group tasks_;
 };
 
