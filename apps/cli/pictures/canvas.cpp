@@ -57,13 +57,16 @@ void Canvas::frame(const Box& box, const Colour& c) {
   cairo_stroke(cairo_->context);
 }
 
-void Canvas::line(const std::vector<Pixel>& points, const Colour& c, double width) {
+void Canvas::line(const std::vector<Pixel>& points, const Colour& c, double width, bool is_dashed) {
   if (points.empty()) return;
+  constexpr double kDash[] = {8.0, 4.0};
+  cairo_set_dash(cairo_->context, kDash, is_dashed ? 2 : 0, 0.0);
   cairo_set_source_rgba(cairo_->context, c.r, c.g, c.b, c.a);
   cairo_set_line_width(cairo_->context, width);
   cairo_move_to(cairo_->context, points.front().x, points.front().y);
   for (const Pixel& p : points) cairo_line_to(cairo_->context, p.x, p.y);
   cairo_stroke(cairo_->context);
+  cairo_set_dash(cairo_->context, nullptr, 0, 0.0);
 }
 
 void Canvas::dot(Pixel at, double radius, const Colour& c) {

@@ -35,7 +35,7 @@ class Canvas {
 
   void fill(const Box& box, const Colour& colour);
   void frame(const Box& box, const Colour& colour);
-  void line(const std::vector<Pixel>& points, const Colour& colour, double width = 1.5);
+  void line(const std::vector<Pixel>& points, const Colour& colour, double width = 1.5, bool is_dashed = false);
   void dot(Pixel at, double radius, const Colour& colour);
   void ring(Pixel centre, double radius, const Colour& colour);
   /// `at` is the middle of the text's height at the side that `align` names.

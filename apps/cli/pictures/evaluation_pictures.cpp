@@ -12,13 +12,13 @@ namespace {
 
 constexpr Colour kAll{0.12, 0.35, 0.70}, kReverse{0.90, 0.45, 0.05}, kLoop{0.85, 0.05, 0.05}, kFalse{0.0, 0.0, 0.0};
 
-void draw_curve(Canvas& canvas, const Chart& chart, const RetrievalTable& table, const Colour& colour) {
+void draw_curve(Canvas& canvas, const Chart& chart, const Curve& curve) {
   std::vector<Pixel> line;
-  for (const PrecisionRecall& point : table.curve) line.push_back(chart.at(point.recall, point.precision));
-  canvas.line(line, colour, 2.5);
+  for (const PrecisionRecall& point : curve.table->curve) line.push_back(chart.at(point.recall, point.precision));
+  canvas.line(line, curve.colour, 2.5, curve.is_dashed);
   constexpr std::size_t kFew = 60;  // single answers can be told apart
   if (line.size() <= kFew)
-    for (const Pixel& point : line) canvas.dot(point, 3.5, colour);
+    for (const Pixel& point : line) canvas.dot(point, 3.5, curve.colour);
 }
 
 void draw_legend_entry(Canvas& canvas, Pixel at, const Curve& curve) {
@@ -26,7 +26,7 @@ void draw_legend_entry(Canvas& canvas, Pixel at, const Curve& curve) {
   const std::string text =
       format("%s: %zu revisits, R@1 %.3f, F1max %.3f, AP %.3f, R@P100 %.3f", curve.name.c_str(), table.revisits,
              table.recall_at_1, table.f1_max, table.average_precision, table.recall_at_p100);
-  canvas.line({at, {at.x + 30, at.y}}, curve.colour, 3);
+  canvas.line({at, {at.x + 30, at.y}}, curve.colour, 3, curve.is_dashed);
   canvas.text({at.x + 40, at.y}, text, 14);
 }
 
@@ -45,7 +45,7 @@ Status draw_precision_recall(const std::filesystem::path& file, const std::vecto
   chart.draw_axes("precision over recall, top-1 answers, same place within 4 m", "recall", "precision");
   Pixel legend{90, 692};
   for (const Curve& curve : curves) {
-    draw_curve(canvas, chart, *curve.table, curve.colour);
+    draw_curve(canvas, chart, curve);
     draw_legend_entry(canvas, legend, curve);
     legend.y += 28;
   }
@@ -95,9 +95,8 @@ Status draw_trajectory(const std::filesystem::path& file, const Reference& refer
     before = &entry.T_world_lidar;
   }
   draw_loops(false);
-  char text[160];
-  std::snprintf(text, sizeof text, "%zu frames, %zu revisits, %zu accepted loops (red), %zu of them false (black)",
-                entries.size(), loops.revisits, loops.accepted, loops.false_loops);
+  const std::string text = format("%zu frames, %zu revisits, %zu accepted loops (red), %zu of them false (black)",
+                                  entries.size(), loops.revisits, loops.accepted, loops.false_loops);
   canvas.text({525, 950}, text, 15, Align::kCentre);
   return canvas.save_png(file);
 }

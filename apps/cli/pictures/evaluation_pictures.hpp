@@ -19,6 +19,7 @@ struct Curve {
   std::string name;
   const RetrievalTable* table = nullptr;
   Colour colour;
+  bool is_dashed = false;
 };
 Status draw_precision_recall(const std::filesystem::path& file, const std::vector<Curve>& curves);
 Status draw_precision_recall(const std::filesystem::path& file, const RetrievalTable& all,

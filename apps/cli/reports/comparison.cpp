@@ -105,12 +105,14 @@ std::string to_json(const std::vector<MethodReport>& methods) {
 }
 
 Status draw_comparison(const std::filesystem::path& file, const std::vector<MethodReport>& methods) {
-  constexpr std::array kColours{Colour{0.85, 0.05, 0.05}, Colour{0.12, 0.35, 0.70}, Colour{0.50, 0.70, 0.90},
-                                Colour{0.95, 0.60, 0.10}, Colour{0.55, 0.30, 0.05}, Colour{0.20, 0.60, 0.25},
-                                Colour{0.45, 0.45, 0.45}};
+  // Seven that colour-blind people tell apart (Okabe and Ito), then the same, dashed.
+  constexpr std::array kColours{Colour{0.84, 0.37, 0.00}, Colour{0.00, 0.45, 0.70}, Colour{0.35, 0.70, 0.90},
+                                Colour{0.90, 0.60, 0.00}, Colour{0.00, 0.62, 0.45}, Colour{0.80, 0.47, 0.65},
+                                Colour{0.30, 0.30, 0.30}};
   std::vector<Curve> curves;
   for (std::size_t i = 0; i < methods.size(); ++i)
-    curves.push_back({methods[i].name, &methods[i].evaluation.retrieval, kColours[i % kColours.size()]});
+    curves.push_back({methods[i].name, &methods[i].evaluation.retrieval, kColours[i % kColours.size()],
+                      i / kColours.size() % 2 == 1});
   return draw_precision_recall(file, curves);
 }
 
