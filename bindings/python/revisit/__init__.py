@@ -83,6 +83,25 @@ def _iterate(self):
 Recording.__iter__ = _iterate
 
 
+def _interruptible(work):
+    """work() in a thread of its own, so that Ctrl-C is obeyed at once; the work then goes on behind the scenes."""
+    if _threading.current_thread() is not _threading.main_thread():
+        return work()
+    outcome = {}
+
+    def run():
+        try:
+            outcome["result"] = work()
+        except BaseException as error:  # raised where it is waited for
+            outcome["error"] = error
+    thread = _threading.Thread(target=run, name="revisit", daemon=True)
+    thread.start()
+    thread.join()
+    if "error" in outcome:
+        raise outcome["error"]
+    return outcome["result"]
+
+
 class _Stream:
     """Numbers and stamps scans that come without; one thread at a time."""
 
@@ -215,8 +234,8 @@ class Slam:
     """
 
     def __init__(self, folder=None, parameters=None, *, scale=None, odometry=None, new_session=False):
-        self._slam = _core.Slam("" if folder is None else _os.fspath(folder), _values(parameters), scale,
-                                odometry is not None, new_session)
+        self._slam = _interruptible(lambda: _core.Slam("" if folder is None else _os.fspath(folder), _values(parameters),
+                                                       scale, odometry is not None, new_session))
         self._odometry, self._stream = odometry, _Stream()
         if self._slam.last_frame() is not None:
             before = self._slam.trajectories()[0]
@@ -232,8 +251,10 @@ class Slam:
         return self._stream.use(work, points, intensity, time, ring, stamp, frame)
 
     def finish(self):
-        """Decides about loops that wait, and settles the graph. More scans may follow."""
-        self._slam.finish()
+        """Decides about loops that wait, and settles the graph: some seconds a thousand key frames. More scans may follow.
+
+        After Ctrl-C it goes on behind the scenes; the next call waits for it."""
+        _interruptible(self._slam.finish)
 
     def trajectory(self):
         """The corrected Trajectory, of all scans so far."""
@@ -264,7 +285,7 @@ class Localiser:
         map = _os.fspath(map)
         if not _os.path.exists(map):
             raise FileNotFoundError(2, "no such map", map)
-        self._localiser, self._stream = _core.Localiser(map, _values(parameters)), _Stream()
+        self._localiser, self._stream = _interruptible(lambda: _core.Localiser(map, _values(parameters))), _Stream()
 
     def locate(self, points, intensity=None, time=None, ring=None):
         """One scan without a prior: a Localisation."""

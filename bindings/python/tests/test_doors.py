@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -107,6 +108,34 @@ def test_ctrl_c_ends_a_map(scans):
     with pytest.raises(KeyboardInterrupt):
         slam.map(lambda done: signal.raise_signal(signal.SIGINT))
     assert len(slam.map())  # nothing is lost
+
+
+def test_ctrl_c_is_obeyed_while_a_map_is_settled(scans):
+    slam = revisit.Slam()
+    for scan in scans[:60]:
+        slam.process(scan)
+    began = threading.Event()
+    finish = slam._slam.finish
+
+    class Slow:  # as of a large map
+        def __getattr__(self, name):
+            return getattr(slam_itself, name)
+
+        def finish(self):
+            began.set()
+            time.sleep(1.0)
+            finish()
+    slam_itself, slam._slam = slam._slam, Slow()
+    threading.Thread(target=lambda: (began.wait(), os.kill(os.getpid(), signal.SIGINT))).start()
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        slam.finish()
+    assert time.monotonic() - start < 0.9
+    slam._slam = slam_itself
+    time.sleep(1.0)
+    assert len(slam.trajectory()) == 60  # waits for what goes on behind the scenes
+    with pytest.raises(revisit.Error):  # errors come through
+        revisit.Slam("/proc/nowhere")
 
 
 def test_ctrl_c_in_a_log_handler_is_not_swallowed(scans):
