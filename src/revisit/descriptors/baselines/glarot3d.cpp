@@ -17,7 +17,7 @@ namespace revisit::descriptors_internal {
 namespace {
 
 constexpr int kCells = 100, kAround = 2, kKeypoints = 100, kLengths = 20, kFace = 4, kTurns = 4 * kFace;
-constexpr Eigen::Index kSides = kTurns * kFace, kDirections = kSides + 2;
+constexpr Eigen::Index kSides = Eigen::Index{kTurns} * kFace, kDirections = kSides + 2;
 constexpr float kLeastHeight_m = 1.f, kLength_m = 2.f;
 
 std::vector<Eigen::Vector3f> keypoints_of(std::span<const Point> points, float ground_z_m) {
@@ -32,14 +32,16 @@ std::vector<Eigen::Vector3f> keypoints_of(std::span<const Point> points, float g
     constexpr float kReach_m = kCells / 2.f;
     if (!(std::abs(p.x) < kReach_m) || !(std::abs(p.y) < kReach_m)) continue;
     const int i = cell(p.x), j = cell(p.y);
-    Column& column = columns[static_cast<std::size_t>(i * kCells + j)];
+    Column& column = columns[static_cast<std::size_t>(i) * kCells + static_cast<std::size_t>(j)];
     const float up = p.z - ground_z_m;
     column.low = column.count > 0.f ? std::min(column.low, up) : up;
     column.high = column.count > 0.f ? std::max(column.high, up) : up;
     column.sum += Eigen::Vector3f(p.x, p.y, up);
     column.count += 1.f;
   }
-  const auto height = [&](int i, int j) { return columns[static_cast<std::size_t>(i * kCells + j)].height(); };
+  const auto height = [&](int i, int j) {
+    return columns[static_cast<std::size_t>(i) * kCells + static_cast<std::size_t>(j)].height();
+  };
   std::vector<std::pair<float, Eigen::Vector3f>> found;
   for (int i = kAround; i + kAround < kCells; ++i)
     for (int j = kAround; j + kAround < kCells; ++j) {
@@ -51,7 +53,7 @@ std::vector<Eigen::Vector3f> keypoints_of(std::span<const Point> points, float g
             around += height(i + di, j + dj);
             if (std::max(std::abs(di), std::abs(dj)) == 1) highest = std::max(highest, height(i + di, j + dj));
           }
-      const Column& column = columns[static_cast<std::size_t>(i * kCells + j)];
+      const Column& column = columns[static_cast<std::size_t>(i) * kCells + static_cast<std::size_t>(j)];
       constexpr float kCellsAround = (2 * kAround + 1) * (2 * kAround + 1) - 1;
       if (column.height() >= highest)
         found.emplace_back(column.height() - around / kCellsAround, column.sum / column.count);

@@ -27,7 +27,7 @@ std::vector<Eigen::Vector2f> occupied_cells(std::span<const Point> points, float
   for (const Point& p : points) {
     if (p.z < lowest_m || !(std::abs(p.x) < kReach_m) || !(std::abs(p.y) < kReach_m)) continue;
     const int i = std::clamp(cell(p.x), 0, kCells - 1), j = std::clamp(cell(p.y), 0, kCells - 1);
-    const auto index = static_cast<std::size_t>(i * kCells + j);
+    const auto index = static_cast<std::size_t>(i) * kCells + static_cast<std::size_t>(j);
     if (is_occupied[index]) continue;
     is_occupied[index] = true;
     cells.emplace_back(centre(i), centre(j));

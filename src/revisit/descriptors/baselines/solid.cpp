@@ -23,7 +23,7 @@ class Voxels {
  public:
   bool is_new(const Point& p) {
     const auto cell = [](float metres, int cells) {
-      return static_cast<std::size_t>(std::clamp(std::floor(metres / kVoxel_m) + static_cast<float>(cells / 2), 0.f,
+      return static_cast<std::size_t>(std::clamp(std::floor(metres / kVoxel_m) + 0.5f * static_cast<float>(cells), 0.f,
                                                  static_cast<float>(cells - 1)));
     };
     auto&& bit = met_[(cell(p.x, kAcross) * kAcross + cell(p.y, kAcross)) * kUp + cell(p.z, kUp)];
