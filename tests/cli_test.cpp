@@ -136,8 +136,8 @@ TEST(Cli, CompareRunsEachMethodOverTheSameScans) {
   const std::string exclusion = " --retrieval.exclude_frames 3 --retrieval.exclude_s 3";
   const Outcome all = run("compare " + drive.string() + exclusion + " --out " + out.string());
   ASSERT_EQ(all.code, 0) << all.output;
-  for (const char* method : {"revisit", "isc-paper", "isc-program", "scan-context-ring-key", "scan-context",
-                             "scan-context++", "m2dp", "glarot3d", "lidar-iris", "ring", "solid"}) {
+  for (const char* method : {"revisit", "revisit-retrieval", "isc-paper", "isc-program", "scan-context-ring-key",
+                             "scan-context", "scan-context++", "m2dp", "glarot3d", "lidar-iris", "ring", "solid"}) {
     EXPECT_NE(all.output.find(method), std::string::npos) << all.output;
     EXPECT_TRUE(fs::exists(out / method / "candidates.csv")) << method;
   }

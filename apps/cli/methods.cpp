@@ -7,10 +7,12 @@
 
 #include <oneapi/tbb/parallel_for.h>
 
+#include <revisit/core/refusal_text.hpp>
+
 namespace revisit::cli {
 namespace {
 
-constexpr const char *kOurs = "revisit", *kPaper = "isc-paper";
+constexpr const char *kOurs = "revisit", *kOurRetrieval = "revisit-retrieval", *kPaper = "isc-paper";
 
 // Milliseconds that this thread has worked: other programs, and other methods beside, do not count. (What the program
 // times itself, its search and all of isc-paper, is by the clock on the wall.)
@@ -18,6 +20,10 @@ double worked_ms() {
   std::timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
+}
+
+std::size_t bytes_of(const IntensityScanContext& descriptor) {
+  return descriptor.intensity.size() + descriptor.occupancy.size() * sizeof(std::uint64_t);
 }
 
 template <typename Work>
@@ -30,7 +36,7 @@ double time_ms(Work work) {
 }  // namespace
 
 std::vector<std::string> Methods::names() {
-  std::vector<std::string> names{kOurs, kPaper};
+  std::vector<std::string> names{kOurs, kOurRetrieval, kPaper};
   for (const auto& baseline : make_baselines()) names.push_back(baseline->name());
   return names;
 }
@@ -50,6 +56,9 @@ Methods::Methods(const Options& options, const Parameters& parameters, const Int
   };
   const auto places = [&] { return std::make_unique<PlaceRecognition>(parameters, clouds_in_memory()); };
   if (is_wanted(kOurs)) add(kOurs, "this program, with the parameters given").places_ = places();
+  if (is_wanted(kOurRetrieval))
+    add(kOurRetrieval, "this program's index alone: its first answer, unverified").index_ =
+        std::make_unique<PlaceIndex>(parameters.retrieval);
   if (is_wanted(kPaper)) {
     Parameters as_printed = *preset("paper");
     static_cast<ExclusionRule&>(as_printed.retrieval) = parameters.retrieval;
@@ -98,6 +107,7 @@ Status Method::answer(const Scan& raw, const PreparedScan* prepared, const Typic
       return;
     }
     if (!prepared) return;
+    if (index_) status = search(*prepared);
     if (baseline_) status = retrieve(*prepared);
     if (status && places_) status = recognise(*prepared, typical);
   });
@@ -112,6 +122,23 @@ Status Method::retrieve(const PreparedScan& scan) {
   return row_ ? writer_->add(*row_) : ok();
 }
 
+Status Method::search(const PreparedScan& scan) {
+  const FrameTime query{scan.scan.frame, scan.scan.stamp_s};
+  Result<std::vector<LoopCandidate>> found = std::vector<LoopCandidate>{};
+  report.retrieval_ms +=
+      scan.ms.describe + time_ms([&] { found = index_->search(scan.descriptor, index_->searchable(query)); });
+  if (!found) return found.error();
+  index_->add(query.frame, query.stamp_s, scan.descriptor);
+  report.bytes_a_place = bytes_of(scan.descriptor);
+  if (found->empty()) return ok();
+  CandidateRow row;
+  row.query = query.frame;
+  row.match = found->front().match;
+  row.score = found->front().score();
+  row.reason = to_text(Refusal{Refusal::Reason::kNoPose});
+  return writer_->add(row);
+}
+
 Status Method::recognise(const PreparedScan& scan, const TypicalAgreement& typical) {
   const std::size_t searchable = places_->index().searchable({scan.scan.frame, scan.scan.stamp_s});
   Result<Detection> detection = Detection{};
@@ -119,7 +146,7 @@ Status Method::recognise(const PreparedScan& scan, const TypicalAgreement& typic
   if (!detection) return detection.error();
   if (!baseline_) {
     report.retrieval_ms += scan.ms.describe + detection->search_ms;
-    report.bytes_a_place = scan.descriptor.intensity.size() + scan.descriptor.occupancy.size() * sizeof(std::uint64_t);
+    report.bytes_a_place = bytes_of(scan.descriptor);
   }
   report.verification_ms += baseline_ ? worked : std::max(0.0, worked - detection->search_ms);
   const Status written = write(*detection, baseline_ ? std::nullopt : std::optional(detection->row()));

@@ -33,12 +33,15 @@ class Method {
  private:
   friend class Methods;
   Status retrieve(const PreparedScan& scan);
+  Status search(const PreparedScan& scan);
   Status recognise(const PreparedScan& scan, const TypicalAgreement& typical);
   Status write(const Detection& detection, const std::optional<CandidateRow>& row);
 
-  // What it is made of: a retrieval of its own, and this program's places; a baseline alone; or a whole detector.
+  // What it is made of: a baseline, and this program's places to verify its answers; either alone; this program's index
+  // alone; or a whole detector.
   std::unique_ptr<BaselineSearch> baseline_;
   std::unique_ptr<PlaceRecognition> places_;
+  std::unique_ptr<PlaceIndex> index_;
   std::unique_ptr<LoopDetector> detector_;
   std::optional<CandidateRow> row_;  ///< of the baseline
   std::optional<ResultWriter> writer_;

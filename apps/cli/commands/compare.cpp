@@ -145,7 +145,8 @@ Run add_compare(CLI::App& program) {
       "candidates.csv (docs/formats.md)\n"
       "of any program with --candidates, or revisit.compare(own=...) in Python.\n\n"
       "Methods:\n"
-      "  revisit                this program, with the parameters given\n"
+      "  revisit                this program, with the parameters given; its scores are those after verification\n"
+      "  revisit-retrieval      its index alone: the first answer, unverified\n"
       "  isc-paper              Intensity Scan Context as in the paper\n";
   for (const auto& baseline : make_baselines())
     footer += "  " + baseline->name() + std::string(23 - std::min<std::size_t>(22, baseline->name().size()), ' ') +
