@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What Python costs a scan: arrays into LoopDetector.process() against the same object of the library fed with scans that
-are there already, in turns. usage: overhead.py [SCANS] [SENSOR]"""
+are there already, turn about. usage: overhead.py [SCANS] [SENSOR]"""
 import sys
 import time
 
@@ -17,11 +17,13 @@ times = {"library": [], "Python": []}
 detector, core = revisit.LoopDetector(), _core.LoopDetector(revisit.Parameters()._values, None)
 for i, (scan, array) in enumerate(zip(scans, arrays)):
     ready = revisit.Scan(array, stamp=0.1 * i, frame=i)
-    for name, work in (("library", lambda: core.process(ready, None)),
-                       ("Python", lambda: detector.process(array, stamp=0.1 * i, frame=i))):
+    turns = [("library", lambda: core.process(ready, None)),
+             ("Python", lambda: detector.process(array, stamp=0.1 * i, frame=i))]
+    for name, work in turns if i % 2 == 0 else reversed(turns):
         start = time.perf_counter()
         work()
         times[name].append(time.perf_counter() - start)
-library, python = (1e3 * np.median(times[name]) for name in ("library", "Python"))
-print(f"{count} scans of {np.mean([len(scan) for scan in scans]):.0f} points ({sensor}), median: library {library:.2f} ms, Python "
-      f"{python:.2f} ms a scan: {100 * (python / library - 1):+.1f} %")
+times = {name: 1e3 * np.array(each) for name, each in times.items()}
+library, cost = np.median(times["library"]), np.median(times["Python"] - times["library"])
+print(f"{count} scans of {np.mean([len(scan) for scan in scans]):.0f} points ({sensor}): library {library:.2f} ms a scan, Python "
+      f"{cost:.2f} ms more: {100 * cost / library:+.1f} % (medians, the second of differences scan by scan)")

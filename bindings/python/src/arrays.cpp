@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstring>
+#include <span>
 #include <sstream>
 
 #include <revisit/io/point_cloud.hpp>
@@ -71,18 +72,36 @@ std::vector<Point> read_strided(const char* data, std::size_t count, py::ssize_t
 
 bool is_finite(const Point& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
-// Passes without branches, by the bits of the floats: most scans hold none.
-bool has_points_that_are_none(const std::vector<Point>& points) {
-  constexpr std::uint32_t kWithoutSign = 0x7FFFFFFF, kInfinite = 0x7F800000;
-  std::uint32_t not_finite = 0, at_origin = 0;
-  for (const Point& p : points) {
-    std::uint32_t bits[4];
-    std::memcpy(bits, &p, sizeof bits);
-    for (std::uint32_t& each : bits) each &= kWithoutSign;
-    for (const std::uint32_t each : bits) not_finite |= each + (kWithoutSign + 1 - kInfinite);  // carries into the sign
-    at_origin |= (bits[0] | bits[1] | bits[2]) - 1;
+bool is_none(const Point& p) {
+  return !is_finite(p) || !std::isfinite(p.intensity) || (p.x == 0.f && p.y == 0.f && p.z == 0.f);
+}
+
+// Four points at a time, which are alright where all values are finite and no x is 0; else one by one.
+bool any_is_none(std::span<const Point> points) {
+  using FourPoints = Eigen::Array<float, 16, 1>;
+  FourPoints nan_if_not_finite = FourPoints::Zero(), least = FourPoints::Ones();
+  const std::size_t in_fours = points.size() / 4 * 4;
+  for (std::size_t i = 0; i < in_fours; i += 4) {
+    const Eigen::Map<const FourPoints, Eigen::Aligned16> four(&points[i].x);
+    nan_if_not_finite += four * 0.f;
+    least = least.min(four.abs());
   }
-  return ((not_finite | at_origin) & ~kWithoutSign) != 0;
+  const bool are_alright =
+      (nan_if_not_finite == 0.f).all() && least[0] > 0.f && least[4] > 0.f && least[8] > 0.f && least[12] > 0.f;
+  return std::any_of(points.begin() + static_cast<std::ptrdiff_t>(are_alright ? in_fours : 0), points.end(), is_none);
+}
+
+// Copies, and says whether any of them is none, by blocks that stay in the first cache.
+bool copy_and_look(std::span<const Point> from, std::vector<Point>& to) {
+  constexpr std::size_t kBlock = 1024;
+  bool some_are_none = false;
+  to.reserve(from.size());
+  for (std::size_t first = 0; first < from.size(); first += kBlock) {
+    const auto block = from.subspan(first, std::min(kBlock, from.size() - first));
+    to.insert(to.end(), block.begin(), block.end());
+    some_are_none = some_are_none || any_is_none(std::span(to).last(block.size()));
+  }
+  return some_are_none;
 }
 
 void leave_out_points_that_are_none(Scan& scan) {
@@ -106,17 +125,18 @@ Scan read_points(const py::array& array, Columns columns) {
   const auto* data = static_cast<const char*>(array.data());
   return without_lock([&] {
     Scan scan;
+    bool some_are_none = false;
     if (lies_as_points) {
-      const auto* points = reinterpret_cast<const Point*>(data);
-      scan.points.assign(points, points + count);
+      some_are_none = copy_and_look({reinterpret_cast<const Point*>(data), count}, scan.points);
     } else {
       scan.points = is_float ? read_strided<float>(data, count, row, step, width)
                              : read_strided<double>(data, count, row, step, width);
+      some_are_none = any_is_none(scan.points);
     }
     for (std::size_t i = 0; i < columns.intensity.size(); ++i) scan.points[i].intensity = columns.intensity[i];
     scan.times_s = std::move(columns.time);
     scan.rings = std::move(columns.ring);
-    if (has_points_that_are_none(scan.points)) leave_out_points_that_are_none(scan);
+    if (some_are_none || !columns.intensity.empty()) leave_out_points_that_are_none(scan);
     return scan;
   });
 }

@@ -50,6 +50,16 @@ def test_points_that_are_none_go_with_their_columns():
     assert len(scan) == 2
 
 
+@pytest.mark.parametrize("place", [0, 1, 1023, 1024, 4099, 4100, 4101, 4102])
+@pytest.mark.parametrize("none", [[0, 0, 0, 1], [1, np.nan, 1, 1], [1, 1, -np.inf, 1], [-0.0, 0, -0.0, np.nan]])
+def test_one_point_that_is_none_is_found_wherever_it_lies(place, none):
+    array = np.full((4103, 4), 2, dtype=np.float32)
+    array[place] = none
+    assert len(revisit.Scan(array)) == 4102
+    array[place] = [0, 1, 1, 1]  # to the left of the sensor
+    assert len(revisit.Scan(array)) == 4103
+
+
 @pytest.mark.parametrize("points, says", [
     (np.zeros((3, 5)), r"\(3, 5\) of float64; allowed: \(N, 3\)"), (np.zeros(4), "allowed"), (np.zeros((2, 3), dtype=int), "int64"),
     (np.zeros((2, 3), dtype=">f4"), "allowed"), (np.zeros((2, 3), dtype=np.float16), "float16"), ("text", "allowed")])
