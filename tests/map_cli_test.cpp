@@ -139,7 +139,7 @@ TEST(MapCli, MergesAndExports) {
                                    {"pcd", "map.pcd"},
                                    {"las", "map.las"},
                                    {"png", "map.png"},
-                                   {"tiles", "tiles/tiles.json"},
+                                   {"tiles", "tiles/tileset.json"},
                                    {"grid", "grid.yaml"},
                                    {"tum", "session_1.tum"},
                                    {"g2o", "graph.g2o"}}) {

@@ -46,7 +46,7 @@ TEST(SlamCli, WritesTrajectoryMapAndGraph) {
   ASSERT_EQ(ply->points.size(), pcd->points.size());
   EXPECT_EQ(ply->points[500].x, pcd->points[500].x);
   EXPECT_EQ(ply->points[500].intensity, pcd->points[500].intensity);
-  for (const char* name : {"map.png", "tiles/tiles.json", "run.json", "loops.csv", "candidates.csv", "map.revisit"})
+  for (const char* name : {"map.png", "tiles/tileset.json", "run.json", "loops.csv", "candidates.csv", "map.revisit"})
     EXPECT_TRUE(fs::exists(out / name)) << name;
 
   const auto evaluated = run("evaluate " + out.string() + " --reference " + drive.string());

@@ -124,7 +124,7 @@ Status judge_trajectories(const fs::path& folder, const Trajectory& reference, E
   for (const auto* each : {&before, &after})
     if (!*each) return each->error();
   report.trajectories = {before->table, after->table};
-  return draw_trajectories(folder / "trajectories.png", reference, *before, *after, folder / "tiles");
+  return draw_trajectories(folder / "trajectories.png", reference, *before, *after, folder / "map.ply");
 }
 
 // True poses of the map's key frames: a reference for each session, in the order in which they entered the map.

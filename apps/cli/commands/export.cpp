@@ -91,17 +91,19 @@ Result<Part> find_part(const SavedMap& map, int number, std::optional<int> after
 
 Status export_points(const SavedMap& map, const Part& part, const ExportOptions& options, double voxel_m) {
   const MapStore& store = *map.store();
-  const MapInput input{part.poses,
-                       [&](std::size_t i) { return read_map_points(store, part.frames[i], options.after_session); }};
+  MapInput input{part.poses,
+                 [&](std::size_t i) { return read_map_points(store, part.frames[i], options.after_session); }};
+  for (const FrameId frame : part.frames) input.sessions.push_back(session_of(frame));
   MapOptions how{.voxel_m = voxel_m, .formats = {}, .las_offset_m = part.offset_m};
-  if (options.as == "ply") how.formats = {CloudFormat::kPly};
+  if (options.as == "ply" || options.as == "png") how.formats = {CloudFormat::kPly};
   if (options.as == "pcd") how.formats = {CloudFormat::kPcd};
   if (options.as == "las") how.formats = {CloudFormat::kLas};
   // Beside what is in the folder already, which stays.
   const fs::path out = options.out, scratch = out / ".export.part";
   std::error_code failure;
-  if (options.as == "tiles" && fs::exists(out / "tiles", failure) && !fs::exists(out / "tiles" / "tiles.json", failure))
-    return Error{(out / "tiles").string() + ": is there already and holds no tiles.json; name another folder"};
+  if (options.as == "tiles" && fs::exists(out / "tiles", failure) &&
+      !fs::exists(out / "tiles" / "tileset.json", failure))
+    return Error{(out / "tiles").string() + ": is there already and holds no tileset.json; name another folder"};
   fs::create_directories(scratch, failure);
   if (failure) return Error{scratch.string() + ": cannot be created: " + failure.message()};
   Progress progress("export", "key frames", part.frames.size());
@@ -111,7 +113,7 @@ Status export_points(const SavedMap& map, const Part& part, const ExportOptions&
   });
   Status status = report ? ok() : Status(report.error());
   if (status && interrupted()) status = Error{"interrupted; nothing was written"};
-  if (status && options.as == "png") status = draw_map(scratch / "map.png", scratch / "tiles", part.poses);
+  if (status && options.as == "png") status = draw_map(scratch / "map.png", scratch / "map.ply", part.poses);
   if (status) {
     const std::string name = options.as == "tiles" ? "tiles" : "map." + options.as;
     if (options.as == "tiles") fs::remove_all(out / name, failure);
@@ -184,7 +186,8 @@ Run add_export(CLI::App& program) {
   command->footer(
       "  ply, pcd, las  the points: map.ply, map.pcd, map.las\n"
       "  png            a picture of the map from above\n"
-      "  tiles          the points in squares of 50 m, with tiles.json\n"
+      "  tiles          the points for viewers that stream: OGC 3D Tiles 1.1 with levels of detail, "
+      "tiles/tileset.json\n"
       "  grid           grid.pgm and grid.yaml: what is free, occupied and unknown, for navigation in two dimensions\n"
       "  tum            the trajectory of each session: session_0.tum, ...\n"
       "  g2o            the pose graph of all sessions: graph.g2o\n\n"

@@ -228,7 +228,7 @@ Status write_map(const Slam& slam, const fs::path& out, RunFile& run) {
   run.counts["map_points"] = report->points;
   run.counts["moving_points_left_out"] = report->moving;
   run.ms_total["map"] = watch.lap_ms();
-  return draw_map(out / "map.png", out / "tiles", slam.graph().graph().nodes());
+  return draw_map(out / "map.png", out / "map.ply", slam.graph().graph().nodes());
 }
 
 int slam(const SlamOptions& options) {
@@ -324,7 +324,7 @@ Run add_slam(CLI::App& program) {
       "(formats: docs/formats.md):\n"
       "  poses.txt/.tum   the corrected trajectory\n"
       "  odometry.tum     the trajectory before any loop\n"
-      "  map.ply/.pcd     the map, without what moved; map.png shows it, tiles/ holds it in tiles of 50 m\n"
+      "  map.ply/.pcd     the map, without what moved; map.png shows it, tiles/ holds it for viewers (3D Tiles)\n"
       "  graph.g2o        the pose graph\n"
       "  loops.csv, candidates.csv, run.json   as `revisit detect` writes them, for key frames\n"
       "  map.revisit      everything as it is found: an interrupted run continues with --resume (docs/maps.md)\n\n"

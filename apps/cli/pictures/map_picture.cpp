@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <iterator>
+#include <span>
 
-#include <revisit/io/scan_file.hpp>
+#include <revisit/mapping/cloud_file.hpp>
 
 namespace revisit::cli {
 namespace {
@@ -20,7 +21,7 @@ class Overview {
         width_(static_cast<std::size_t>(chart.box().width)),
         counts_(width_ * static_cast<std::size_t>(chart.box().height)) {}
 
-  void add(const std::vector<Point>& points, const Pose& T_chart_map) {
+  void add(std::span<const Point> points, const Pose& T_chart_map) {
     for (const Point& p : points) {
       const Eigen::Vector3d q = T_chart_map * Eigen::Vector3d(p.x, p.y, p.z);
       const Pixel at = chart_.at(q.x(), q.y());
@@ -57,20 +58,16 @@ class Overview {
 
 }  // namespace
 
-Status draw_overview(Canvas& canvas, const Chart& chart, const std::filesystem::path& tiles, const Pose& T_chart_map) {
+Status draw_overview(Canvas& canvas, const Chart& chart, const std::filesystem::path& cloud, const Pose& T_chart_map) {
   std::error_code failure;
+  if (!std::filesystem::exists(cloud, failure)) return ok();
   Overview overview(chart);
-  for (std::filesystem::directory_iterator it(tiles, failure), end; !failure && it != end; it.increment(failure)) {
-    if (it->path().extension() != ".ply") continue;
-    const auto scan = read_scan(it->path());
-    if (!scan) return scan.error();
-    overview.add(scan->points, T_chart_map);
-  }
+  const Status status = read_back(cloud, [&](std::span<const Point> points) { overview.add(points, T_chart_map); });
   overview.draw(canvas);
-  return ok();
+  return status;
 }
 
-Status draw_map(const std::filesystem::path& file, const std::filesystem::path& tiles,
+Status draw_map(const std::filesystem::path& file, const std::filesystem::path& cloud,
                 const std::vector<Pose>& T_world_keyframes) {
   if (T_world_keyframes.empty()) return ok();
   Chart::Range x{1e9, -1e9}, y{1e9, -1e9};
@@ -83,7 +80,7 @@ Status draw_map(const std::filesystem::path& file, const std::filesystem::path& 
   Chart chart(canvas, {kMargin, 40.0, kSide - kMargin - 20.0, kSide - kMargin - 40.0},
               {x.min - border_m, x.max + border_m}, {y.min - border_m, y.max + border_m}, true);
   canvas.clip(chart.box());
-  if (const Status status = draw_overview(canvas, chart, tiles, Pose::Identity()); !status) return status;
+  if (const Status status = draw_overview(canvas, chart, cloud, Pose::Identity()); !status) return status;
   std::vector<Pixel> line;
   line.reserve(T_world_keyframes.size());
   for (const Pose& T : T_world_keyframes) line.push_back(chart.at(T.translation().x(), T.translation().y()));

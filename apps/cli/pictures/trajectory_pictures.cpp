@@ -36,7 +36,7 @@ void draw_line(Canvas& canvas, const Chart& chart, const Trajectory& trajectory,
 }  // namespace
 
 Status draw_trajectories(const std::filesystem::path& file, const Trajectory& reference, const JudgedTrajectory& before,
-                         const JudgedTrajectory& after, const std::filesystem::path& tiles) {
+                         const JudgedTrajectory& after, const std::filesystem::path& cloud) {
   Chart::Range x{1e30, -1e30}, y{1e30, -1e30};
   const auto cover = [&](const Trajectory& trajectory, const Pose& T_reference_estimate) {
     for (const auto& [frame, entry] : trajectory.entries) {
@@ -56,7 +56,7 @@ Status draw_trajectories(const std::filesystem::path& file, const Trajectory& re
     Chart chart(canvas, {left + 80, 60, kPanel - 110, kHeight - 190}, {x.min - margin_m, x.max + margin_m},
                 {y.min - margin_m, y.max + margin_m}, true);
     canvas.clip(chart.box());
-    if (const Status status = draw_overview(canvas, chart, tiles, T_after); !status) return status;
+    if (const Status status = draw_overview(canvas, chart, cloud, T_after); !status) return status;
     draw_line(canvas, chart, reference, Pose::Identity(), kReference, 4.0);
     draw_line(canvas, chart, judged.trajectory, is_after ? T_after : T_before, is_after ? kAfter : kBefore, 1.8);
     canvas.unclip();

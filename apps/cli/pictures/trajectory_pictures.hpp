@@ -15,10 +15,10 @@ struct JudgedTrajectory {
   TrajectoryTable table;
 };
 
-/// Side by side, without and with loop closing: the trajectory over the reference, and over the map where `tiles` holds
-/// one. Odometry starts where the reference starts, so that drift shows; the corrected trajectory is aligned as a
-/// whole.
+/// Side by side, without and with loop closing: the trajectory over the reference, and over the map where `cloud`, a
+/// map.ply, is there. Odometry starts where the reference starts, so that drift shows; the corrected trajectory is
+/// aligned as a whole.
 Status draw_trajectories(const std::filesystem::path& file, const Trajectory& reference, const JudgedTrajectory& before,
-                         const JudgedTrajectory& after, const std::filesystem::path& tiles);
+                         const JudgedTrajectory& after, const std::filesystem::path& cloud);
 
 }  // namespace revisit::cli

@@ -95,7 +95,7 @@ bool is_present(const fs::path& path) {
 // What `revisit slam` wrote holds a map.ply and a map.pcd, which are no scans.
 bool is_map_folder(const fs::path& folder) {
   std::error_code failure;
-  return fs::is_regular_file(folder / "tiles" / "tiles.json", failure) ||
+  return fs::is_regular_file(folder / "tiles" / "tileset.json", failure) ||
          fs::is_regular_file(folder / "map.revisit", failure) || fs::is_regular_file(folder / "map.sqlite", failure);
 }
 

@@ -96,7 +96,7 @@ TEST(Recording, AMapIsNoRecording) {
   const fs::path folder = fresh_folder();
   write_bin(folder / "map.bin", 1.f);
   fs::create_directories(folder / "tiles");
-  std::ofstream(folder / "tiles" / "tiles.json") << "{}";
+  std::ofstream(folder / "tiles" / "tileset.json") << "{}";
   EXPECT_NE(open_recording(folder).error().message.find("holds a map"), std::string::npos);
 }
 

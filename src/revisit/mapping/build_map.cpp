@@ -3,13 +3,16 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <deque>
 #include <optional>
-#include <sstream>
+
+#include <tbb/parallel_for.h>
 
 #include <revisit/mapping/cloud_file.hpp>
 #include <revisit/mapping/internal/moving_points.hpp>
 #include <revisit/mapping/internal/tile_files.hpp>
+#include <revisit/mapping/tileset_writer.hpp>
 
 namespace revisit {
 namespace {
@@ -94,62 +97,120 @@ Status for_each_keyframe(const MapInput& input, const MapOptions& options, std::
   return ok();
 }
 
-Result<MapTile> write_tile(TileFiles& files, const TileIndex& index, const MapOptions& options, const fs::path& tiles) {
-  const auto raw = files.take(index);
-  if (!raw) return raw.error();
-  const std::vector<Point> points = one_point_a_voxel(*raw, options.voxel_m);
-  MapTile tile;
-  tile.x = index.x;
-  tile.y = index.y;
-  tile.file = "tile_" + std::to_string(index.x) + "_" + std::to_string(index.y) + ".ply";
-  tile.points = points.size();
-  const auto [low, high] =
-      std::minmax_element(points.begin(), points.end(), [](const Point& a, const Point& b) { return a.z < b.z; });
-  tile.min_z_m = static_cast<double>(low->z);
-  tile.max_z_m = static_cast<double>(high->z);
-  CloudFile file(tiles / tile.file, CloudFormat::kPly, points.size());
-  file.add(points);
-  if (const Status status = file.finish(); !status) return status.error();
-  return tile;
+std::vector<MapPoint> labelled(const std::vector<Point>& points, const MapInput& input, std::size_t keyframe) {
+  const std::size_t last = std::max<std::size_t>(1, input.T_world_keyframes.size() - 1);
+  const auto time = static_cast<std::uint16_t>(keyframe * UINT16_MAX / last);
+  const auto session = static_cast<std::uint16_t>(input.sessions.empty() ? 0 : input.sessions[keyframe]);
+  std::vector<MapPoint> result;
+  result.reserve(points.size());
+  for (const Point& p : points) result.push_back({p.x, p.y, p.z, p.intensity, session, time});
+  return result;
 }
 
-// The points stand at the end of the tile's file.
-Status append_tile(const fs::path& tile_file, std::size_t count, std::vector<CloudFile>& maps) {
-  std::ifstream stream(tile_file, std::ios::binary);
-  std::vector<Point> points(count);
-  const auto bytes = static_cast<std::streamoff>(count * sizeof(Point));
-  stream.seekg(-bytes, std::ios::end);
-  stream.read(reinterpret_cast<char*>(points.data()), bytes);
-  if (!stream) return Error{tile_file.string() + ": cannot be read back"};
-  for (CloudFile& map : maps) map.add(points);
-  return ok();
+std::vector<Point> without_labels(const std::vector<MapPoint>& points) {
+  std::vector<Point> result;
+  result.reserve(points.size());
+  for (const MapPoint& p : points) result.push_back({p.x, p.y, p.z, p.intensity});
+  return result;
 }
 
-Status write_index(const fs::path& file, const MapReport& report, const MapOptions& options) {
-  std::ostringstream text;
-  text << "{\n  \"tile_m\": " << options.tile_m << ",\n  \"voxel_m\": " << options.voxel_m << ",\n  \"tiles\": [";
-  for (std::size_t i = 0; i < report.tiles.size(); ++i) {
-    const MapTile& tile = report.tiles[i];
-    text << (i == 0 ? "\n" : ",\n") << "    {\"file\": \"" << tile.file << "\", \"x\": " << tile.x
-         << ", \"y\": " << tile.y << ", \"points\": " << tile.points << ", \"min_z_m\": " << tile.min_z_m
-         << ", \"max_z_m\": " << tile.max_z_m << "}";
+// What is known once all squares are thinned.
+struct Extent {
+  std::vector<TileIndex> squares;  // in Morton order
+  TilesetBounds bounds;
+  TileIndex first;  // lowest x and y
+  std::size_t points = 0;
+};
+
+// Leaves one point a voxel in each file.
+Result<Extent> thin_squares(const TileFiles& files, double voxel_m) {
+  struct Thinned {
+    Status status = ok();
+    std::size_t points = 0;
+    float low_m = 0.f, high_m = 0.f;
+  };
+  Extent extent;
+  extent.squares = files.tiles();
+  extent.bounds.voxel_m = voxel_m;
+  std::vector<Thinned> each(extent.squares.size());
+  tbb::parallel_for(std::size_t{0}, each.size(), [&](std::size_t i) {
+    const auto raw = files.take(extent.squares[i]);
+    if (!raw) {
+      each[i].status = raw.error();
+      return;
+    }
+    const std::vector<MapPoint> points = one_point_a_voxel(*raw, voxel_m);
+    const auto [low, high] = std::minmax_element(points.begin(), points.end(),
+                                                 [](const MapPoint& a, const MapPoint& b) { return a.z < b.z; });
+    each[i] = {files.replace(extent.squares[i], points), points.size(), low->z, high->z};
+  });
+  for (const Thinned& thinned : each)
+    if (!thinned.status) return thinned.status.error();
+  if (each.empty()) return extent;
+  TileIndex last = extent.first = extent.squares.front();
+  Eigen::Vector3d &low = extent.bounds.low, &high = extent.bounds.high;
+  low.z() = static_cast<double>(each.front().low_m);
+  high.z() = static_cast<double>(each.front().high_m);
+  for (std::size_t i = 0; i < each.size(); ++i) {
+    const TileIndex& square = extent.squares[i];
+    extent.first = {std::min(extent.first.x, square.x), std::min(extent.first.y, square.y)};
+    last = {std::max(last.x, square.x), std::max(last.y, square.y)};
+    low.z() = std::min(low.z(), static_cast<double>(each[i].low_m));
+    high.z() = std::max(high.z(), static_cast<double>(each[i].high_m));
+    extent.points += each[i].points;
   }
-  text << "\n  ]\n}\n";
-  std::ofstream stream(file);
-  stream << text.str();
-  stream.close();
-  return stream ? ok() : Status(Error{file.string() + ": cannot be written"});
+  const double square_m = TilesetWriter::square_m(voxel_m);
+  low.head<2>() = square_m * Eigen::Vector2d(extent.first.x, extent.first.y);
+  high.head<2>() = square_m * Eigen::Vector2d(last.x + 1, last.y + 1);
+  high.head<2>().array() -= voxel_m;  // inside the last square
+  const auto order = [&](const TileIndex& square) {
+    return TilesetWriter::order(static_cast<std::uint32_t>(square.x - extent.first.x),
+                                static_cast<std::uint32_t>(square.y - extent.first.y));
+  };
+  std::sort(extent.squares.begin(), extent.squares.end(),
+            [&](const TileIndex& a, const TileIndex& b) { return order(a) < order(b); });
+  return extent;
+}
+
+// The tiles, and the files of the whole map, in one pass over the squares.
+Status write_files(const TileFiles& files, const Extent& extent, const MapOptions& options, const fs::path& folder) {
+  constexpr std::size_t kAtOnce = 8;
+  TilesetWriter tileset(folder / "tiles", extent.bounds);
+  std::vector<CloudFile> maps;
+  for (const CloudFormat format : options.formats) {
+    const char* const name = format == CloudFormat::kPly   ? "map.ply"
+                             : format == CloudFormat::kPcd ? "map.pcd"
+                                                           : "map.las";
+    maps.emplace_back(folder / name, format, extent.points, options.las_offset_m);
+  }
+  for (std::size_t begin = 0; begin < extent.squares.size(); begin += kAtOnce) {
+    std::vector<TilesetWriter::Square> squares;
+    for (std::size_t i = begin; i < std::min(begin + kAtOnce, extent.squares.size()); ++i) {
+      const TileIndex& index = extent.squares[i];
+      auto points = files.take(index);
+      if (!points) return points.error();
+      const std::vector<Point> plain = without_labels(*points);
+      for (CloudFile& map : maps) map.add(plain);
+      squares.push_back({static_cast<std::uint32_t>(index.x - extent.first.x),
+                         static_cast<std::uint32_t>(index.y - extent.first.y), *std::move(points)});
+    }
+    if (const Status status = tileset.add(squares); !status) return status;
+  }
+  for (CloudFile& map : maps)
+    if (const Status status = map.finish(); !status) return status;
+  return tileset.finish();
 }
 
 }  // namespace
 
 Result<std::vector<Point>> collect_map(const MapInput& input, const MapOptions& options,
                                        const std::function<bool(std::size_t)>& progress) {
-  std::vector<Point> points;
+  std::vector<MapPoint> points;
   std::size_t moving = 0, thin_at = 4'000'000;
   bool is_stopped = false;
   const auto take = [&](const std::vector<Point>& placed, std::size_t done) {
-    points.insert(points.end(), placed.begin(), placed.end());
+    const std::vector<MapPoint> added = labelled(placed, input, done - 1);
+    points.insert(points.end(), added.begin(), added.end());
     // Thinned meanwhile: most of what a key frame sees is in the map already.
     if (points.size() > thin_at) {
       points = one_point_a_voxel(points, options.voxel_m);
@@ -160,7 +221,7 @@ Result<std::vector<Point>> collect_map(const MapInput& input, const MapOptions& 
   };
   if (const Status status = for_each_keyframe(input, options, moving, take); !status) return status.error();
   if (is_stopped) return std::vector<Point>{};
-  return one_point_a_voxel(points, options.voxel_m);
+  return without_labels(one_point_a_voxel(points, options.voxel_m));
 }
 
 Result<MapReport> build_map(const MapInput& input, const MapOptions& options, const fs::path& folder,
@@ -172,12 +233,12 @@ Result<MapReport> build_map(const MapInput& input, const MapOptions& options, co
   if (failure) return Error{tiles.string() + ": cannot be created: " + failure.message()};
 
   MapReport report;
-  TileFiles files(tiles, options.tile_m);
+  TileFiles files(tiles, TilesetWriter::square_m(options.voxel_m));
   Status written = ok();
   bool is_stopped = false;
   const Status visited =
       for_each_keyframe(input, options, report.moving, [&](const std::vector<Point>& placed, std::size_t done) {
-        written = files.add(placed);
+        written = files.add(labelled(placed, input, done - 1));
         is_stopped = progress && !progress(done);
         return written && !is_stopped ? Next::kGoOn : Next::kStop;
       });
@@ -188,24 +249,10 @@ Result<MapReport> build_map(const MapInput& input, const MapOptions& options, co
     return report;
   }
   if (const Status status = files.flush(); !status) return status.error();
-  for (const TileIndex& index : files.tiles()) {
-    auto tile = write_tile(files, index, options, tiles);
-    if (!tile) return tile.error();
-    report.points += tile->points;
-    report.tiles.push_back(*std::move(tile));
-  }
-  std::vector<CloudFile> maps;
-  for (const CloudFormat format : options.formats) {
-    const char* const name = format == CloudFormat::kPly   ? "map.ply"
-                             : format == CloudFormat::kPcd ? "map.pcd"
-                                                           : "map.las";
-    maps.emplace_back(folder / name, format, report.points, options.las_offset_m);
-  }
-  for (const MapTile& tile : report.tiles)
-    if (const Status status = append_tile(tiles / tile.file, tile.points, maps); !status) return status.error();
-  for (CloudFile& map : maps)
-    if (const Status status = map.finish(); !status) return status.error();
-  if (const Status status = write_index(tiles / "tiles.json", report, options); !status) return status.error();
+  const auto extent = thin_squares(files, options.voxel_m);
+  if (!extent) return extent.error();
+  report.points = extent->points;
+  if (const Status status = write_files(files, *extent, options, folder); !status) return status.error();
   return report;
 }
 

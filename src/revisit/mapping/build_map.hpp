@@ -16,23 +16,13 @@ namespace revisit {
 
 struct MapOptions {
   double voxel_m = 0.2;     ///< edge of the voxels: one point each
-  double tile_m = 50.0;     ///< edge of a tile on the ground plane
   bool thin_moving = true;  ///< leave out what stood there for a moment only
   /// Of the whole map, one file each: map.ply, map.pcd, map.las.
   std::vector<CloudFormat> formats = {CloudFormat::kPly, CloudFormat::kPcd};
   Eigen::Vector3d las_offset_m = Eigen::Vector3d::Zero();  ///< as for CloudFile
 };
 
-/// One tile of the map: a file that a viewer can load by itself.
-struct MapTile {
-  std::string file;  ///< its name in the folder `tiles`
-  int x = 0, y = 0;  ///< covers [x, x + 1) * tile_m by [y, y + 1) * tile_m
-  std::size_t points = 0;
-  double min_z_m = 0.0, max_z_m = 0.0;
-};
-
 struct MapReport {
-  std::vector<MapTile> tiles;
   std::size_t points = 0, moving = 0;  ///< of the map; left out, before thinning
 };
 
@@ -40,6 +30,7 @@ struct MapReport {
 struct MapInput {
   std::vector<Pose> T_world_keyframes;
   std::function<Result<std::vector<Point>>(std::size_t)> points;  ///< of key frame i in its own frame, or none
+  std::vector<int> sessions = {};                                 ///< of each key frame; empty: all of one
 };
 
 /// The map as points in the world's frame: one a voxel, without what moved. In memory at once. `progress(done)` counts
@@ -47,9 +38,9 @@ struct MapInput {
 Result<std::vector<Point>> collect_map(const MapInput& input, const MapOptions& options,
                                        const std::function<bool(std::size_t)>& progress = {});
 
-/// Puts key frames together into `folder`: a file a format, and tiles/ with a .ply a tile and tiles.json.
-/// In memory are some key frames and one tile at a time. `progress(done)` counts key frames and stops the work
-/// by returning false: then nothing is written.
+/// Puts key frames together into `folder`: a file a format, and tiles/ as TilesetWriter has it.
+/// In memory are some key frames and a few squares of 50 m at a time. `progress(done)` counts key frames and stops the
+/// work by returning false: then nothing is written.
 Result<MapReport> build_map(const MapInput& input, const MapOptions& options, const std::filesystem::path& folder,
                             const std::function<bool(std::size_t)>& progress = {});
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <string>
 #include <vector>
 
 namespace revisit {
@@ -104,6 +105,21 @@ Status CloudFile::finish() {
   stream_.close();
   if (stream_) return ok();
   return Error{file_.string() + ": cannot be written: " + std::strerror(errno)};
+}
+
+Status read_back(const std::filesystem::path& ply, const std::function<void(std::span<const Point>)>& take) {
+  constexpr int kMostLines = 20;
+  constexpr std::size_t kPart = 1 << 16;
+  std::ifstream stream(ply, std::ios::binary);
+  std::string line;
+  for (int i = 0; line != "end_header"; ++i)
+    if (i == kMostLines || !std::getline(stream, line)) return Error{ply.string() + ": is no map that slam wrote"};
+  std::vector<Point> points(kPart);
+  while (stream) {
+    stream.read(reinterpret_cast<char*>(points.data()), static_cast<std::streamsize>(kPart * sizeof(Point)));
+    take(std::span(points).first(static_cast<std::size_t>(stream.gcount()) / sizeof(Point)));
+  }
+  return ok();
 }
 
 }  // namespace revisit

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <span>
 
 #include <Eigen/Core>
@@ -38,5 +39,8 @@ class CloudFile {
   Eigen::Vector3d las_offset_m_;
   Eigen::Vector3d lowest_ = Eigen::Vector3d::Zero(), highest_ = Eigen::Vector3d::Zero();
 };
+
+/// Reads a PLY that CloudFile wrote, part by part.
+Status read_back(const std::filesystem::path& ply, const std::function<void(std::span<const Point>)>& take);
 
 }  // namespace revisit

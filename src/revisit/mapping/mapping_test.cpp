@@ -111,26 +111,6 @@ TEST(CloudFile, LasHasItsBoundsAndItsPoints) {
   EXPECT_EQ(at(std::uint16_t{}, 227 + 12), 65535);
 }
 
-TEST(BuildMap, TilesHoldTheWholeMapOnce) {
-  const fs::path folder = fresh_folder("tiles");
-  const auto report =
-      build_map({{planar_pose(100, 100, kPi / 2)}, [](std::size_t) { return wall_from(0.0); }}, {}, folder);
-  ASSERT_TRUE(report);
-  ASSERT_GE(report->tiles.size(), 2u);
-  std::size_t points = 0;
-  for (const MapTile& tile : report->tiles) {
-    for (const Point& p : read_points(folder / "tiles" / tile.file)) {
-      EXPECT_EQ(std::floor(p.x / 50.f), static_cast<float>(tile.x));
-      EXPECT_EQ(std::floor(p.y / 50.f), static_cast<float>(tile.y));
-      EXPECT_NEAR(p.x, 79.95f, 1e-2f) << "the wall, turned to the left";
-      ++points;
-    }
-  }
-  EXPECT_EQ(points, report->points);
-  for (const auto& entry : fs::directory_iterator(folder / "tiles"))
-    EXPECT_EQ(entry.path().filename().string().find("unfinished"), std::string::npos);
-}
-
 TEST(BuildMap, AnUnreadableKeyframeAndAFolderThatCannotBe) {
   const auto broken = build_map(
       {{Pose::Identity()}, [](std::size_t) -> Result<std::vector<Point>> { return Error{"key frame 0 is damaged"}; }},
@@ -163,11 +143,13 @@ TEST(CollectMap, HoldsThePointsOfTheFiles) {
 
 TEST(OnePointAVoxel, IsTheMean) {
   const auto points = mapping_internal::one_point_a_voxel(
-      {{0.01f, 0.01f, -0.01f, 0.2f}, {0.03f, 0.05f, -0.03f, 0.4f}, {0.3f, 0.f, 0.f, 1.f}}, 0.2);
+      {{0.01f, 0.01f, -0.01f, 0.2f, 1, 7}, {0.03f, 0.05f, -0.03f, 0.4f, 2, 9}, {0.3f, 0.f, 0.f, 1.f}}, 0.2);
   ASSERT_EQ(points.size(), 2u);
   EXPECT_NEAR(points[0].x, 0.02f, 1e-6f);
   EXPECT_NEAR(points[0].z, -0.02f, 1e-6f);
   EXPECT_NEAR(points[0].intensity, 0.3f, 1e-6f);
+  EXPECT_EQ(points[0].session, 1) << "of the first";
+  EXPECT_EQ(points[0].time, 7);
 }
 
 }  // namespace

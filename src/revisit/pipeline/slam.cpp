@@ -196,13 +196,16 @@ Result<Slam::Trajectories> Slam::trajectories() const {
 MapInput Slam::map_input() const {
   std::vector<FrameId> frames;
   std::vector<Pose> poses;
+  std::vector<int> sessions;
   for (const FrameId frame : graph().keyframes()) {
     if (session_of(frame) != session_ && graph().part(frame) != graph().part(graph().keyframes().back())) continue;
     frames.push_back(frame);
     poses.push_back(graph().T_world_lidar(frame));
+    sessions.push_back(session_of(frame));
   }
   return {std::move(poses),
-          [this, frames = std::move(frames)](std::size_t i) { return read_map_points(*store_, frames[i]); }};
+          [this, frames = std::move(frames)](std::size_t i) { return read_map_points(*store_, frames[i]); },
+          std::move(sessions)};
 }
 
 Result<std::vector<Point>> Slam::map(const std::function<bool(std::size_t)>& progress) const {

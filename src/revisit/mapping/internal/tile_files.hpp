@@ -7,7 +7,7 @@
 #include <vector>
 
 #include <revisit/core/result.hpp>
-#include <revisit/core/scan.hpp>
+#include <revisit/mapping/map_point.hpp>
 
 namespace revisit::mapping_internal {
 
@@ -23,23 +23,25 @@ class TileFiles {
   /// Files of unfinished tiles stand in `folder`, which exists.
   TileFiles(std::filesystem::path folder, double tile_m) : folder_(std::move(folder)), tile_m_(tile_m) {}
 
-  Status add(const std::vector<Point>& points);
+  Status add(const std::vector<MapPoint>& points);
+  /// The points of one tile, instead of what it has. Threads may work at different tiles.
+  Status replace(const TileIndex& tile, const std::vector<MapPoint>& points) const;
   Status flush();
   std::vector<TileIndex> tiles() const;
-  /// All points of a tile; its file is gone afterwards.
-  Result<std::vector<Point>> take(const TileIndex& tile);
+  /// All points of a tile, which is flushed; its file is gone afterwards.
+  Result<std::vector<MapPoint>> take(const TileIndex& tile) const;
 
  private:
   std::filesystem::path file(const TileIndex& tile) const;
-  Status append(const TileIndex& tile, std::vector<Point>& points);
+  Status append(const TileIndex& tile, std::vector<MapPoint>& points);
 
   std::filesystem::path folder_;
   double tile_m_;
-  std::map<TileIndex, std::vector<Point>> waiting_;
+  std::map<TileIndex, std::vector<MapPoint>> waiting_;
   std::size_t points_waiting_ = 0;
 };
 
-/// One point a voxel, the mean of its points, in the order of the voxels.
-std::vector<Point> one_point_a_voxel(const std::vector<Point>& points, double voxel_m);
+/// One point a voxel, the mean of its points with the labels of the first, in the order of the voxels.
+std::vector<MapPoint> one_point_a_voxel(const std::vector<MapPoint>& points, double voxel_m);
 
 }  // namespace revisit::mapping_internal
