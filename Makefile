@@ -1,11 +1,11 @@
 # The front door on a bare Debian 12 machine. `make demo` and `make test` install what is missing, build and run.
-.PHONY: demo python ros1 ros1-demo ros2 test oracles build configure packages bench lint format sanitize clean
+.PHONY: demo viewer python ros1 ros1-demo ros2 test oracles build configure packages bench lint format sanitize clean
 JOBS ?= $(shell nproc)
 # What ccache keeps of one clone serves the others.
 export CCACHE_BASEDIR ?= $(CURDIR)
 export CCACHE_NOHASHDIR ?= 1
 
-demo: packages configure
+demo: packages viewer configure
 	cmake --build --preset release --parallel $(JOBS) --target revisit
 	@ln -sfn release/revisit build/revisit
 	@scripts/demo.sh
@@ -28,7 +28,7 @@ ros2: packages
 	cmake --build --preset release --parallel $(JOBS) --target revisit_dds_node
 
 # The Python package as a wheel (out/python), installed into a fresh environment and tested there.
-python: packages
+python: packages viewer
 	@scripts/install_packages.sh $$(grep -v '^#' bindings/python/packages.txt)
 	@mkdir -p out/python && rm -rf out/python/* bindings/python/build bindings/python/*.egg-info
 	cd bindings/python && REVISIT_PYTHON_BUILD=$(CURDIR)/build/python /usr/bin/python3 -m build --wheel --no-isolation --outdir ../../out/python > /dev/null
@@ -38,15 +38,29 @@ python: packages
 	cd out/python && venv/bin/python -m pytest -q -p no:cacheprovider ../../bindings/python/tests
 	@ls -sh out/python/*.whl
 
-test: oracles build
+test: oracles browser build
 	ctest --preset release --parallel $(JOBS)
 
-build: packages configure
+build: packages viewer configure
 	cmake --build --preset release --parallel $(JOBS)
 	@ln -sfn release/revisit build/revisit
 
-configure: packages
+configure: packages | viewer
 	@cmake --preset release --log-level=NOTICE > /dev/null
+
+# The page of `revisit view`, which the program carries: rebuilt where its sources are newer.
+viewer: apps/viewer/dist/viewer.js
+apps/viewer/dist/viewer.js: apps/viewer/node_modules/.package-lock.json $(wildcard apps/viewer/src/*) apps/viewer/index.html apps/viewer/vite.config.js
+	@npm run build --prefix apps/viewer --silent
+	@touch $@
+apps/viewer/node_modules/.package-lock.json: apps/viewer/package-lock.json | packages
+	@command -v npm > /dev/null || scripts/install_packages.sh nodejs npm
+	@npm ci --prefix apps/viewer --ignore-scripts --no-audit --no-fund --omit=peer --silent
+	@touch $@
+
+# What the page is tested in.
+browser: packages
+	@scripts/install_packages.sh $$(grep -v '^#' apps/viewer/packages.txt)
 
 # The library of the .mcap format, with which tests compare ours.
 oracles: packages

@@ -47,6 +47,7 @@ DOORS = {
     "zlib": {"src/revisit/io"},
     "pcap": {"src/revisit/io"},
     "cairo": {"apps/cli"},
+    "httplib": {"apps/cli"},
     "CLI/": {"apps/cli", "bindings/ros2/dds"},
     "spdlog/": {"apps/cli"},
     "ros/": {"bindings/ros1"},

@@ -27,6 +27,8 @@ if [ -n "$query" ]; then build/revisit describe "$recording" --frame "$query" --
 echo
 if [ -n "${reference:-}" ]; then
   build/revisit evaluate "$out" --reference "$reference"
+  build/revisit view "$out" --report "$out/view.html"
+  echo "In a browser, with both scans of each loop: build/revisit view $out"
 else
   echo "Report: $out/loops.csv (no reference poses: nothing to score against)"
 fi

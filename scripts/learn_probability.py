@@ -3,7 +3,7 @@
 """Learns the coefficients of src/revisit/verification/loop_probability.cpp. Needs numpy.
 
 usage: scripts/learn_probability.py FOLDER [FOLDER ...]
-Each folder is written by `revisit detect --evidence --geometric.min_overlap 0.25 --geometric.candidates 5
+Each folder is written by `revisit detect --geometric.min_overlap 0.25 --geometric.candidates 5
 --geometric.min_inlier_ratio 0 --geometric.min_probability 0 --geometric.follow false --retrieval.exclude_s 20` over a
 recording with exact poses. Every recording weighs the same, and in each the right
 poses as much as the wrong ones.

@@ -3,7 +3,7 @@
 """Whether probabilities are right: of the poses that are given .9, nine in ten should be. Needs numpy; a picture, matplotlib.
 
 usage: scripts/reliability.py FOLDER [FOLDER ...] [--picture FILE.png]
-Each folder is written by `revisit detect --evidence` over a recording with exact poses. Counted is the surest pose of
+Each folder is written by `revisit detect` over a recording with exact poses. Counted is the surest pose of
 each query. Prints, for bins of probability, how many are right (0.5 m, 3 degrees), and the expected calibration error:
 the mean difference of both."""
 import csv

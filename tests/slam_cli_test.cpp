@@ -46,13 +46,21 @@ TEST(SlamCli, WritesTrajectoryMapAndGraph) {
   ASSERT_EQ(ply->points.size(), pcd->points.size());
   EXPECT_EQ(ply->points[500].x, pcd->points[500].x);
   EXPECT_EQ(ply->points[500].intensity, pcd->points[500].intensity);
-  for (const char* name : {"map.png", "tiles/tileset.json", "run.json", "loops.csv", "candidates.csv", "map.revisit"})
+  for (const char* name :
+       {"map.png", "tiles/tileset.json", "run.json", "loops.csv", "candidates.csv", "evidence.csv", "map.revisit"})
     EXPECT_TRUE(fs::exists(out / name)) << name;
 
   const auto evaluated = run("evaluate " + out.string() + " --reference " + drive.string());
   ASSERT_EQ(evaluated.code, 0) << evaluated.output;
   EXPECT_NE(evaluated.output.find("Table 3, trajectory"), std::string::npos);
   EXPECT_TRUE(fs::exists(out / "trajectories.png"));
+  EXPECT_EQ(read_poses(out / "reference.txt")->rows.size(), 40u);
+
+  const auto viewed = run("view " + out.string() + " --report " + (out / "view.html").string());
+  if (viewed.output.find("built without the page") == std::string::npos) {
+    ASSERT_EQ(viewed.code, 0) << viewed.output;
+    EXPECT_GT(fs::file_size(out / "view.html"), 100'000u);
+  }
 
   const auto again = run("slam " + drive.string() + " --out " + out.string());
   EXPECT_EQ(again.code, 1);

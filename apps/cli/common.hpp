@@ -38,6 +38,7 @@ Run add_export(CLI::App& program);
 /// `revisit info` of a map.
 int info_of_map(const std::string& path, bool check);
 Run add_evaluate(CLI::App& program);
+Run add_view(CLI::App& program);
 Run add_compare(CLI::App& program);
 Run add_describe(CLI::App& program);
 Run add_calibrate(CLI::App& program);

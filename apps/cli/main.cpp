@@ -14,7 +14,8 @@ int main(int argc, char** argv) {
       "  revisit detect RECORDING --out results     find the loops\n"
       "  revisit slam RECORDING --out map           trajectory and map\n"
       "  revisit localise map SCAN                  where in the map is this scan?\n"
-      "  revisit evaluate results --reference POSES score them, draw them\n\n"
+      "  revisit evaluate results --reference POSES score them, draw them\n"
+      "  revisit view map                           look at it in a browser\n\n"
       "RECORDING is a ROS bag (.bag, .mcap, .db3, or a folder of them), a packet capture (.pcap), a KITTI odometry "
       "folder "
       "or\n"
@@ -31,8 +32,9 @@ int main(int argc, char** argv) {
 
   program_arguments().assign(argv + 1, argv + argc);
   std::vector<std::pair<CLI::App*, Run>> commands;
-  for (const auto add : {add_info, add_describe, add_detect, add_slam, add_localise, add_merge, add_export,
-                         add_evaluate, add_compare, add_calibrate, add_simulate, add_convert, add_parameters}) {
+  for (const auto add :
+       {add_info, add_describe, add_detect, add_slam, add_localise, add_merge, add_export, add_evaluate, add_view,
+        add_compare, add_calibrate, add_simulate, add_convert, add_parameters}) {
     Run run = add(program);
     commands.emplace_back(program.get_subcommands({}).back(), std::move(run));
   }

@@ -18,6 +18,7 @@
 #include "common.hpp"
 #include "progress.hpp"
 #include "read_ahead.hpp"
+#include "reports/evidence_file.hpp"
 #include "reports/run_file.hpp"
 
 namespace revisit::cli {
@@ -25,7 +26,7 @@ namespace {
 
 struct DetectOptions {
   std::string input, out, database, calibration, poses;
-  bool overwrite = false, evidence = false;
+  bool overwrite = false;
   InputFlags recording;
   ParameterFlags parameters;
 };
@@ -48,37 +49,6 @@ void count(RunFile& run, const Detection& detection) {
                                      {"geometric", detection.geometric_ms}})
     run.ms_total[stage] += value;
 }
-
-// evidence.csv: the measures of every candidate that was registered.
-class EvidenceFile {
- public:
-  static constexpr const char* kHeader =
-      "query,match,inlier_ratio,inlier_share,free_space_agreement,intensity_agreement,rmse_m,overlap,"
-      "distance_m,least_fixed,voxel_m,inliers,log_odds,tx,ty,tz,qx,qy,qz,qw\n";
-  explicit EvidenceFile(const std::filesystem::path& file) : file_(file.string()), stream_(file) {
-    stream_ << kHeader << std::setprecision(10);
-  }
-  Status add(const Detection& detection) {
-    for (const Detection::Registered& each : detection.registered) {
-      const LoopEvidence& e = each.evidence.evidence;
-      const Eigen::Vector3d t = each.evidence.T_match_query.translation();
-      const Eigen::Quaterniond q(each.evidence.T_match_query.rotation());
-      stream_ << detection.frame.value << ',' << each.match.value << ',' << e.inlier_ratio << ',' << e.inlier_share
-              << ',' << e.free_space_agreement << ',';
-      if (e.intensity_agreement) stream_ << *e.intensity_agreement;
-      for (const double value :
-           {e.rmse_m, e.overlap, e.distance_m, e.least_fixed, e.voxel_m, static_cast<double>(e.inliers),
-            each.evidence.log_odds, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()})
-        stream_ << ',' << value;
-      stream_ << '\n';
-    }
-    return stream_ ? ok() : Status(Error{file_ + ": cannot be written"});
-  }
-
- private:
-  std::string file_;
-  std::ofstream stream_;
-};
 
 // Scans that cannot be used are named, counted and left out; the rest goes on.
 void skip(RunFile& run, Progress& progress, const Error& error) {
@@ -112,8 +82,8 @@ Status add_database(LoopDetector& detector, const Recording& database, RunFile& 
 // What becomes of the scan that comes as number i.
 using DetectOne = std::function<Result<Detection>(Scan scan, std::size_t i)>;
 
-Status detect_all(const Recording& recording, const DetectOne& detect_one, ResultWriter& writer,
-                  std::optional<EvidenceFile>& evidence, RunFile& run) {
+Status detect_all(const Recording& recording, const DetectOne& detect_one, ResultWriter& writer, EvidenceFile& evidence,
+                  RunFile& run) {
   Progress progress("detect", "scans", recording.size());
   ReadAhead scans(recording);
   for (std::size_t i = 0; i < recording.size() && !interrupted(); ++i) {
@@ -131,8 +101,7 @@ Status detect_all(const Recording& recording, const DetectOne& detect_one, Resul
       ++run.counts["scans"];
       count(run, *detection);
       if (const Status status = write_loop(writer, *detection); !status) return status;
-      if (evidence)
-        if (const Status status = evidence->add(*detection); !status) return status;
+      if (const Status status = evidence.add(*detection); !status) return status;
     }
     progress.update(i + 1);
   }
@@ -215,8 +184,7 @@ int detect(const DetectOptions& options) {
   if (database->recording)
     if (const Status status = add_database(detector, *database->recording, run); !status) return fail(status.error());
   if (database->map) run.counts["database_places"] = database->map->places();
-  std::optional<EvidenceFile> evidence;
-  if (options.evidence) evidence.emplace(out / "evidence.csv");
+  EvidenceFile evidence(out);
   const DetectOne detect_one = [&](Scan scan, std::size_t i) -> Result<Detection> {
     if (database->recording) return detector.localise(std::move(scan));
     if (!database->map) return detector.process(std::move(scan), (*recording)->trajectory().at((*recording)->frame(i)));
@@ -267,8 +235,6 @@ Run add_detect(CLI::App& program) {
                       "Pose file (KITTI, TUM, g2o), instead of the recording's own poses; never used to find loops");
   command->add_option("--calibration", options->calibration, "Intensity calibration made by `revisit calibrate`");
   command->add_flag("--overwrite", options->overwrite, "Replace results that are already in the folder");
-  command->add_flag("--evidence", options->evidence,
-                    "Write evidence.csv too: the measures of every candidate that was registered");
   options->recording.add_to(*command);
   options->parameters.add_to(*command);
   return [options] { return detect(*options); };

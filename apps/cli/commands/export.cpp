@@ -38,6 +38,7 @@ struct Part {
   std::vector<FrameId> frames;
   std::vector<Pose> poses;
   Eigen::Vector3d offset_m = Eigen::Vector3d::Zero();  ///< what the poses are to be moved by
+  int epsg = 0;                                        ///< of the UTM zone, where they are in one
 };
 
 // On the grid of a UTM zone. Points are kept as 32-bit numbers, which hold no millions: an offset stands beside them.
@@ -65,6 +66,7 @@ Status put_on_earth(const SavedMap& map, const ExportOptions& options, Part& par
     for (Pose& T : part.poses) T.translation() -= part.offset_m;
   }
   const fs::path file = fs::path(options.out) / "utm.json";
+  part.epsg = frame.epsg();
   const bool is_in_file = options.as == "las";
   std::ofstream json(file);
   json << format("{\"epsg\": %d, \"zone\": \"%s\", \"add_to_xyz_m\": [%.1f, %.1f, 0.0]}\n", frame.epsg(),
@@ -94,7 +96,7 @@ Status export_points(const SavedMap& map, const Part& part, const ExportOptions&
   MapInput input{part.poses,
                  [&](std::size_t i) { return read_map_points(store, part.frames[i], options.after_session); }};
   for (const FrameId frame : part.frames) input.sessions.push_back(session_of(frame));
-  MapOptions how{.voxel_m = voxel_m, .formats = {}, .las_offset_m = part.offset_m};
+  MapOptions how{.voxel_m = voxel_m, .formats = {}, .las_offset_m = part.offset_m, .las_epsg = part.epsg};
   if (options.as == "ply" || options.as == "png") how.formats = {CloudFormat::kPly};
   if (options.as == "pcd") how.formats = {CloudFormat::kPcd};
   if (options.as == "las") how.formats = {CloudFormat::kLas};

@@ -17,7 +17,9 @@
 #include "pictures/map_picture.hpp"
 #include "progress.hpp"
 #include "read_ahead.hpp"
+#include "reports/evidence_file.hpp"
 #include "reports/run_file.hpp"
+#include "view/view_server.hpp"
 
 namespace revisit::cli {
 namespace {
@@ -28,7 +30,7 @@ struct SlamOptions {
   std::string input, out, into, poses, calibration, odometry, wheels;
   std::optional<std::string> gps;
   double sweep_s = 0.0;
-  bool overwrite = false, resume = false, without_map = false;
+  bool overwrite = false, resume = false, without_map = false, is_viewed = false;
   InputFlags recording;
   ParameterFlags parameters;
 };
@@ -136,7 +138,8 @@ void count(RunFile& run, const SlamStep& step) {
     run.ms_total[stage] += value;
 }
 
-Status run_all(Slam& slam, const Recording& recording, const OtherOdometry& odometry, double sweep_s, RunFile& run) {
+Status run_all(Slam& slam, const Recording& recording, const OtherOdometry& odometry, double sweep_s,
+               EvidenceFile& evidence, RunFile& run) {
   std::size_t first = 0;
   if (const auto last = slam.last_frame()) {
     while (first < recording.size() && recording.frame(first) <= *last) ++first;
@@ -153,6 +156,8 @@ Status run_all(Slam& slam, const Recording& recording, const OtherOdometry& odom
     const auto step = scan ? slam.process(*std::move(scan), odometry(i)) : Result<SlamStep>(scan.error());
     if (step) {
       count(run, *step);
+      if (step->detection)
+        if (const Status status = evidence.add(*step->detection); !status) return status;
     } else if (slam.has_failed()) {
       return step.error();
     } else {
@@ -231,6 +236,15 @@ Status write_map(const Slam& slam, const fs::path& out, RunFile& run) {
   return draw_map(out / "map.png", out / "map.ply", slam.graph().graph().nodes());
 }
 
+// The map as it grows, in a browser, until the program ends.
+Result<std::unique_ptr<ViewServer>> look_at(const fs::path& out) {
+  auto view = ResultsView::open(out);
+  if (!view) return view.error();
+  auto server = ViewServer::start({*std::move(view)}, {});
+  if (server) print_log()(LogLevel::kInfo, "look at it while it grows: " + (*server)->address());
+  return server;
+}
+
 int slam(const SlamOptions& options) {
   auto parameters = options.parameters.resolve();
   if (!parameters) return fail(parameters.error(), kUsage);
@@ -280,9 +294,12 @@ int slam(const SlamOptions& options) {
   auto writer =
       ResultWriter::create(out, ResultWriter::Existing::kReplace);  // whether there was a map is decided above
   if (!writer) return fail(writer.error());
+  EvidenceFile evidence(out, options.resume);
+  const auto viewer = options.is_viewed ? look_at(out) : Result<std::unique_ptr<ViewServer>>(nullptr);
+  if (!viewer) return fail(viewer.error());
   listen_for_interrupt();
   Stopwatch watch;
-  Status status = run_all(*slam, **recording, *odometry, options.sweep_s, run);
+  Status status = run_all(*slam, **recording, *odometry, options.sweep_s, evidence, run);
   run.ms_total["all"] = watch.lap_ms();
   run.counts["skipped"] = run.skipped.size();
   // What was found until here is written, whatever happened.
@@ -326,7 +343,7 @@ Run add_slam(CLI::App& program) {
       "  odometry.tum     the trajectory before any loop\n"
       "  map.ply/.pcd     the map, without what moved; map.png shows it, tiles/ holds it for viewers (3D Tiles)\n"
       "  graph.g2o        the pose graph\n"
-      "  loops.csv, candidates.csv, run.json   as `revisit detect` writes them, for key frames\n"
+      "  loops.csv, candidates.csv, evidence.csv, run.json   as `revisit detect` writes them, for key frames\n"
       "  map.revisit      everything as it is found: an interrupted run continues with --resume (docs/maps.md)\n\n"
       "Example: revisit slam kitti/sequences/00 --out maps/00\n"
       "         revisit evaluate maps/00 --reference kitti/poses/00.txt");
@@ -360,6 +377,7 @@ Run add_slam(CLI::App& program) {
   command->add_flag("--resume", options->resume, "Continue the map that is in the folder");
   command->add_flag("--overwrite", options->overwrite, "Replace the map that is in the folder");
   command->add_flag("--no-map", options->without_map, "Write the trajectory only");
+  command->add_flag("--view", options->is_viewed, "Show the map in a browser while it grows (an address is printed)");
   options->recording.add_to(*command);
   options->parameters.add_to(*command);
   return [options] { return slam(*options); };

@@ -181,7 +181,7 @@ Status write_files(const TileFiles& files, const Extent& extent, const MapOption
     const char* const name = format == CloudFormat::kPly   ? "map.ply"
                              : format == CloudFormat::kPcd ? "map.pcd"
                                                            : "map.las";
-    maps.emplace_back(folder / name, format, extent.points, options.las_offset_m);
+    maps.emplace_back(folder / name, format, extent.points, options.las_offset_m, options.las_epsg);
   }
   for (std::size_t begin = 0; begin < extent.squares.size(); begin += kAtOnce) {
     std::vector<TilesetWriter::Square> squares;

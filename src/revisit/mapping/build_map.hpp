@@ -20,6 +20,7 @@ struct MapOptions {
   /// Of the whole map, one file each: map.ply, map.pcd, map.las.
   std::vector<CloudFormat> formats = {CloudFormat::kPly, CloudFormat::kPcd};
   Eigen::Vector3d las_offset_m = Eigen::Vector3d::Zero();  ///< as for CloudFile
+  int las_epsg = 0;                                        ///< likewise
 };
 
 struct MapReport {

@@ -85,30 +85,39 @@ TEST(BuildMap, KeepsWhatStaysAndLeavesOutWhatMoves) {
   EXPECT_GT(unfiltered->points, report->points + 1500);
 }
 
-// As the ASPRS's table of LAS 1.2 has it.
-TEST(CloudFile, LasHasItsBoundsAndItsPoints) {
+// As the ASPRS's table of LAS 1.4 has it.
+TEST(CloudFile, LasHasItsBoundsItsPointsAndItsPlaceOnEarth) {
   const fs::path file = fresh_folder("las") / "map.las";
-  CloudFile las(file, CloudFormat::kLas, 3, {458000.0, 5428000.0, 0.0});
+  CloudFile las(file, CloudFormat::kLas, 3, {458000.0, 5428000.0, 0.0}, 32632);
   const std::vector<Point> points{{1.5f, -2.25f, 0.125f, 1.f}, {-10.f, 4.f, 3.f, 0.f}, {0.f, 0.f, -1.f, 0.5f}};
   las.add(std::span(points).first(2));
   las.add(std::span(points).last(1));
   ASSERT_TRUE(las.finish());
   std::ifstream stream(file, std::ios::binary);
   const std::string all{std::istreambuf_iterator<char>(stream), {}};
-  ASSERT_EQ(all.size(), 227u + 3 * 20);
   const auto at = [&]<typename T>(T value, std::size_t offset) {
     std::memcpy(&value, all.data() + offset, sizeof value);
     return value;
   };
   EXPECT_EQ(all.substr(0, 4), "LASF");
-  EXPECT_EQ(at(std::uint32_t{}, 107), 3u);
+  EXPECT_EQ(at(std::uint8_t{}, 25), 4);
+  EXPECT_EQ(at(std::uint16_t{}, 6), 16) << "the projection is well-known text";
+  const std::size_t data = at(std::uint32_t{}, 96);
+  ASSERT_EQ(all.size(), data + 3 * 30);
+  EXPECT_EQ(at(std::uint8_t{}, 104), 6);
+  EXPECT_EQ(at(std::uint64_t{}, 247), 3u);
   EXPECT_EQ(at(double{}, 155), 458000.0) << "offset of x";
   EXPECT_EQ(at(double{}, 179), 458001.5) << "largest x";
   EXPECT_EQ(at(double{}, 187), 457990.0) << "smallest x";
   EXPECT_EQ(at(double{}, 219), -1.0) << "smallest z";
-  EXPECT_EQ(at(std::int32_t{}, 227), 1500);
-  EXPECT_EQ(at(std::int32_t{}, 227 + 4), -2250);
-  EXPECT_EQ(at(std::uint16_t{}, 227 + 12), 65535);
+  EXPECT_EQ(at(std::int32_t{}, data), 1500);
+  EXPECT_EQ(at(std::int32_t{}, data + 4), -2250);
+  EXPECT_EQ(at(std::uint16_t{}, data + 12), 65535);
+  EXPECT_EQ(at(std::uint32_t{}, 100), 1u);
+  EXPECT_EQ(at(std::uint16_t{}, 375 + 18), 2112);
+  EXPECT_EQ(375u + 54u + at(std::uint16_t{}, 375 + 20), data);
+  EXPECT_NE(all.find("AUTHORITY[\"EPSG\",\"32632\"]"), std::string::npos);
+  EXPECT_NE(all.find("\"central_meridian\",9]"), std::string::npos);
 }
 
 TEST(BuildMap, AnUnreadableKeyframeAndAFolderThatCannotBe) {

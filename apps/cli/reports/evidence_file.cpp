@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "reports/evidence_file.hpp"
+
+#include <iomanip>
+
+namespace revisit::cli {
+
+EvidenceFile::EvidenceFile(const std::filesystem::path& folder, bool goes_on)
+    : file_((folder / "evidence.csv").string()), stream_(file_, goes_on ? std::ios::app : std::ios::trunc) {
+  stream_ << std::setprecision(10);
+  if (stream_.tellp() == 0)
+    stream_ << "query,match,inlier_ratio,inlier_share,free_space_agreement,intensity_agreement,rmse_m,overlap,"
+               "distance_m,least_fixed,voxel_m,inliers,log_odds,tx,ty,tz,qx,qy,qz,qw\n";
+}
+
+Status EvidenceFile::add(const Detection& detection) {
+  for (const Detection::Registered& each : detection.registered) {
+    if (session_of(each.match) != session_of(detection.frame)) continue;
+    const LoopEvidence& e = each.evidence.evidence;
+    const Eigen::Vector3d t = each.evidence.T_match_query.translation();
+    const Eigen::Quaterniond q(each.evidence.T_match_query.rotation());
+    stream_ << in_recording(detection.frame).value << ',' << in_recording(each.match).value << ',' << e.inlier_ratio
+            << ',' << e.inlier_share << ',' << e.free_space_agreement << ',';
+    if (e.intensity_agreement) stream_ << *e.intensity_agreement;
+    for (const double value :
+         {e.rmse_m, e.overlap, e.distance_m, e.least_fixed, e.voxel_m, static_cast<double>(e.inliers),
+          each.evidence.log_odds, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()})
+      stream_ << ',' << value;
+    stream_ << '\n';
+  }
+  return stream_ ? ok() : Status(Error{file_ + ": cannot be written"});
+}
+
+}  // namespace revisit::cli

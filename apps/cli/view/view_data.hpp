@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <revisit/core/candidate_row.hpp>
+#include <revisit/core/loop.hpp>
+#include <revisit/core/pose.hpp>
+#include <revisit/core/result.hpp>
+
+namespace revisit::cli {
+
+/// A scan of the trajectory.
+struct ViewScan {
+  FrameId frame;
+  double stamp_s = 0.0;
+  bool is_keyframe = false;
+  Pose T_map_lidar = Pose::Identity();
+  std::optional<Pose> T_odom_lidar;
+};
+
+/// What view.json is made of.
+struct ViewData {
+  std::string title, command, input;
+  std::vector<std::string> sessions;  ///< the recordings
+  std::vector<ViewScan> scans;        ///< in the order of their frames
+  std::vector<CandidateRow> answers;
+  std::vector<LoopConstraint> loops;
+  std::map<FrameId, Pose> truth;
+  bool has_tiles = false;
+};
+
+/// Of a map (its folder may hold more), or of what `detect` wrote.
+Result<ViewData> read_map_view(const std::filesystem::path& map_file);
+Result<ViewData> read_detect_view(const std::filesystem::path& folder);
+/// view.json (docs/formats.md); `folder` gives evidence.csv and run.json, where they are.
+Result<std::string> to_view_json(const ViewData& data, const std::filesystem::path& folder);
+
+}  // namespace revisit::cli

@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "view/view_server.hpp"
+
+#include <atomic>
+#include <charconv>
+#include <chrono>
+#include <cstdint>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <optional>
+#include <string_view>
+#include <thread>
+#include <utility>
+
+#include <httplib.h>
+#include <nlohmann/json.hpp>
+
+#include "view/page.hpp"
+
+namespace revisit::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using httplib::Request;
+using httplib::Response;
+
+constexpr const char* kPolicy =
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self' blob: data:; img-src 'self' blob: "
+    "data:; worker-src 'self' blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+void refuse(Response& response, int status, const std::string& why) {
+  response.status = status;
+  response.set_content(why + "\n", "text/plain; charset=utf-8");
+}
+
+bool is_same(const std::string& a, const std::string& b) {  // in the same time, whatever they are
+  if (a.size() != b.size()) return false;
+  unsigned differs = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    differs |= static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i]);
+  return differs == 0;
+}
+
+// The host of "host:port" or "[host]:port".
+std::string host_of(const std::string& authority) {
+  if (authority.starts_with('[')) return authority.substr(1, authority.find(']') - 1);
+  return authority.substr(0, authority.find(':'));
+}
+
+// A page of another origin must not read this one through a name that it has pointed here.
+bool is_host_alright(const Request& request, const ServerOptions& options) {
+  const std::string host = host_of(request.get_header_value("Host"));
+  return host == "127.0.0.1" || host == "localhost" || host == "::1" || host == options.host || !options.token.empty();
+}
+
+bool has_token(const Request& request, const std::string& token) {
+  if (token.empty()) return true;
+  if (request.has_param("token") && is_same(request.get_param_value("token"), token)) return true;
+  const std::string cookies = request.get_header_value("Cookie"), name = "revisit_token=";
+  const std::size_t at = cookies.find(name);
+  return at != std::string::npos && is_same(cookies.substr(at + name.size(), token.size()), token);
+}
+
+std::string bytes_of(const std::vector<Point>& points) {
+  return {reinterpret_cast<const char*>(points.data()), points.size() * sizeof(Point)};
+}
+
+std::string to_json(const IntensityScanContext& descriptor) {
+  nlohmann::json rows = {
+      {"rings", descriptor.rings}, {"sectors", descriptor.sectors}, {"intensity", descriptor.intensity}};
+  auto& occupied = rows["occupied"] = nlohmann::json::array();
+  for (int sector = 0; sector < descriptor.sectors; ++sector)
+    for (int ring = 0; ring < descriptor.rings; ++ring) occupied.push_back(descriptor.occupied(ring, sector) ? 1 : 0);
+  return rows.dump();
+}
+
+// A file of the tileset, and no other, wherever links may lead.
+std::optional<std::string> tile(const fs::path& folder, const std::string& name) {
+  std::error_code failure;
+  const fs::path root = fs::canonical(folder, failure);
+  if (failure) return std::nullopt;
+  const fs::path file = fs::canonical(root / name, failure);
+  if (failure || file.parent_path() != root || !fs::is_regular_file(file, failure)) return std::nullopt;
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) return std::nullopt;
+  return std::string{std::istreambuf_iterator<char>(stream), {}};
+}
+
+std::optional<FrameId> frame_in(const std::string& text) {
+  std::int64_t value = 0;
+  const auto [end, problem] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return problem == std::errc() && end == text.data() + text.size() ? std::optional(FrameId{value}) : std::nullopt;
+}
+
+// What changes while a map is made.
+std::string state_of(const ResultsView& view) {
+  std::string state;
+  for (const fs::path& file : {view.folder() / "candidates.csv", view.tiles() / "tileset.json", view.map_file(),
+                               fs::path(view.map_file().string() + "-wal")}) {
+    std::error_code failure;
+    const auto when = fs::last_write_time(file, failure);
+    state += failure ? "-" : std::to_string(when.time_since_epoch().count());
+  }
+  return state;
+}
+
+}  // namespace
+
+class ViewServer::Implementation {
+ public:
+  Implementation(std::vector<std::shared_ptr<ResultsView>> views, const ServerOptions& options)
+      : views_(std::move(views)), options_(options) {
+    server_.new_task_queue = [] { return new httplib::ThreadPool(kThreads); };
+    server_.set_read_timeout(kTimeout_s);
+    server_.set_write_timeout(kTimeout_s);
+    server_.set_keep_alive_timeout(kTimeout_s);
+    server_.set_payload_max_length(1);  // nothing is sent here
+    server_.set_pre_routing_handler(
+        [this](const Request& request, Response& response) { return admit(request, response); });
+    serve("/", "text/html; charset=utf-8", page_html());
+    serve("/viewer.js", "text/javascript; charset=utf-8", page_script());
+    serve("/viewer.css", "text/css; charset=utf-8", page_style());
+    server_.Get("/views.json", [this](const Request&, Response& response) {
+      response.set_content(nlohmann::json({{"views", views_.size()}}).dump(), "application/json");
+    });
+    server_.Get(R"(/([ab])/view\.json)", [this](const Request& request, Response& response) {
+      if (auto* view = view_of(request, response)) send(response, view->json(), "application/json");
+    });
+    server_.Get(
+        R"(/([ab])/tiles/(tileset\.json|\d+_\d+_\d+_\d+\.glb))", [this](const Request& request, Response& response) {
+          auto* view = view_of(request, response);
+          if (view == nullptr) return;
+          const std::string name = request.matches[2];
+          auto bytes = tile(view->tiles(), name);
+          if (!bytes) return refuse(response, 404, name + ": not there");
+          response.set_content(*std::move(bytes), name.ends_with(".glb") ? "model/gltf-binary" : "application/json");
+        });
+    server_.Get(R"(/([ab])/scans/(\d{1,18})\.bin)", [this](const Request& request, Response& response) {
+      auto* view = view_of(request, response);
+      const auto frame = frame_in(request.matches[2]);
+      if (view == nullptr || !frame) return;
+      const auto points = view->points(*frame);
+      if (!points) return refuse(response, 404, points.error().message);
+      response.set_content(bytes_of(*points), "application/octet-stream");
+    });
+    server_.Get(R"(/([ab])/descriptors/(\d{1,18})\.json)", [this](const Request& request, Response& response) {
+      auto* view = view_of(request, response);
+      const auto frame = frame_in(request.matches[2]);
+      if (view == nullptr || !frame) return;
+      const auto descriptor = view->descriptor(*frame);
+      if (!descriptor) return refuse(response, 404, descriptor.error().message);
+      if (!*descriptor)
+        return refuse(response, 404, "the place was known already: its descriptor is that of another key frame");
+      response.set_content(to_json(**descriptor), "application/json");
+    });
+    server_.Get("/events", [this](const Request&, Response& response) { tell_changes(response); });
+  }
+
+  ~Implementation() {
+    is_ending_ = true;
+    server_.stop();
+    if (thread_.joinable()) thread_.join();
+  }
+
+  Result<int> listen() {
+    const int port = options_.port == 0 ? server_.bind_to_any_port(options_.host.c_str())
+                     : server_.bind_to_port(options_.host.c_str(), options_.port) ? options_.port
+                                                                                  : -1;
+    if (port <= 0)
+      return Error{"cannot listen at " + options_.host + ":" + std::to_string(options_.port) +
+                   "; name another port with --port, or 0 for any that is free"};
+    thread_ = std::thread([this] { server_.listen_after_bind(); });
+    while (!server_.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return port;
+  }
+
+ private:
+  static constexpr std::size_t kThreads = 12;
+  static constexpr std::time_t kTimeout_s = 5;
+
+  httplib::Server::HandlerResponse admit(const Request& request, Response& response) {
+    using Routing = httplib::Server::HandlerResponse;
+    for (const auto& [name, value] : {std::pair{"Content-Security-Policy", kPolicy},
+                                      {"X-Content-Type-Options", "nosniff"},
+                                      {"Referrer-Policy", "no-referrer"},
+                                      {"Cross-Origin-Resource-Policy", "same-origin"},
+                                      {"Cache-Control", "no-store"}})
+      response.set_header(name, value);
+    if (request.method != "GET" && request.method != "HEAD") {
+      refuse(response, 405, "this server only reads: GET");
+    } else if (!is_host_alright(request, options_)) {
+      refuse(response, 403, "asked for under another name than 127.0.0.1 or localhost");
+    } else if (!has_token(request, options_.token)) {
+      refuse(response, 403, "the address with its token is needed, as `revisit view` printed it");
+    } else {
+      if (request.has_param("token"))
+        response.set_header("Set-Cookie", "revisit_token=" + options_.token + "; HttpOnly; SameSite=Strict; Path=/");
+      return Routing::Unhandled;
+    }
+    return Routing::Handled;
+  }
+
+  void serve(const char* path, const char* type, std::string_view text) {
+    server_.Get(path, [type, text](const Request&, Response& response) {
+      response.set_content(text.data(), text.size(), type);
+    });
+  }
+
+  ResultsView* view_of(const Request& request, Response& response) {
+    const auto index = static_cast<std::size_t>(request.matches[1].str()[0] - 'a');
+    if (index < views_.size()) return views_[index].get();
+    refuse(response, 404, "there is one view only");
+    return nullptr;
+  }
+
+  static void send(Response& response, Result<std::string> text, const char* type) {
+    if (!text) return refuse(response, 500, text.error().message);
+    response.set_content(*std::move(text), type);
+  }
+
+  // Server-sent events: a message when the files have changed, at most one a second.
+  void tell_changes(Response& response) {
+    response.set_chunked_content_provider(
+        "text/event-stream", [this, last = state_of(*views_.front())](std::size_t, httplib::DataSink& sink) mutable {
+          constexpr auto kStep = std::chrono::milliseconds(100);
+          for (int i = 0; i < 10 && !is_ending_; ++i) std::this_thread::sleep_for(kStep);
+          const std::string now = state_of(*views_.front());
+          const std::string text = now == last ? ": nothing new\n\n" : "data: changed\n\n";
+          last = now;
+          return !is_ending_ && sink.write(text.data(), text.size());
+        });
+  }
+
+  std::vector<std::shared_ptr<ResultsView>> views_;
+  ServerOptions options_;
+  httplib::Server server_;
+  std::thread thread_;
+  std::atomic<bool> is_ending_ = false;
+};
+
+Result<std::unique_ptr<ViewServer>> ViewServer::start(std::vector<std::shared_ptr<ResultsView>> views,
+                                                      const ServerOptions& options) {
+  std::unique_ptr<ViewServer> server(new ViewServer);
+  server->implementation_ = std::make_unique<Implementation>(std::move(views), options);
+  const auto port = server->implementation_->listen();
+  if (!port) return port.error();
+  const bool is_ipv6 = options.host.find(':') != std::string::npos;
+  server->address_ = "http://" + (is_ipv6 ? "[" + options.host + "]" : options.host) + ":" + std::to_string(*port) +
+                     "/" + (options.token.empty() ? "" : "?token=" + options.token);
+  return server;
+}
+
+ViewServer::~ViewServer() = default;
+
+namespace {
+
+std::string to_base64(std::string_view bytes) {
+  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t three = 0;
+    for (std::size_t k = i; k < i + 3; ++k)
+      three = three << 8 | (k < bytes.size() ? static_cast<unsigned char>(bytes[k]) : 0u);
+    for (int k = 0; k < 4; ++k)
+      text += i + static_cast<std::size_t>(k) <= bytes.size() ? kDigits[three >> (18 - 6 * k) & 63] : '=';
+  }
+  return text;
+}
+
+// Texts in a page: "</script>" must not end it.
+std::string embedded(const nlohmann::json& files) {
+  std::string text = files.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace), safe;
+  for (const char c : text) safe += c == '<' ? std::string("\\u003c") : std::string(1, c);
+  return safe;
+}
+
+std::string replaced(std::string text, std::string_view what, std::string_view by) {
+  if (const std::size_t at = text.find(what); at != std::string::npos) text.replace(at, what.size(), by);
+  return text;
+}
+
+// "</script" within the script would end it, too.
+std::string inline_script(std::string_view script) {
+  std::string text(script);
+  for (std::size_t at = text.find("</script"); at != std::string::npos; at = text.find("</script", at + 1))
+    text.replace(at, 2, "<\\/");
+  return text;
+}
+
+// Takes out of a tileset what is not among the files.
+void keep_only(const nlohmann::json& files, nlohmann::json& node) {
+  if (!node.is_object()) return;
+  if (node.contains("content") && !files.contains("a/tiles/" + node["content"].value("uri", ""))) node.erase("content");
+  if (!node.contains("children")) return;
+  auto children = nlohmann::json::array();
+  for (auto& child : node["children"]) {
+    keep_only(files, child);
+    if (child.contains("content") || child.contains("children")) children.push_back(std::move(child));
+  }
+  node.erase("children");
+  if (!children.empty()) node["children"] = std::move(children);
+}
+
+}  // namespace
+
+Result<std::string> view_report(ResultsView& view, std::size_t most_bytes) {
+  const auto data = view.json();
+  if (!data) return data.error();
+  nlohmann::json files = {{"a/view.json", *data}, {"views.json", R"({"views":1})"}};
+  if (const auto tileset = tile(view.tiles(), "tileset.json")) {
+    auto shown = nlohmann::json::parse(*tileset, nullptr, false);
+    if (shown.is_discarded()) return Error{(view.tiles() / "tileset.json").string() + ": is no JSON"};
+    std::error_code failure;
+    std::map<std::pair<int, std::string>, std::size_t> by_level;  // the coarsest first
+    for (fs::directory_iterator it(view.tiles(), failure), end; !failure && it != end; it.increment(failure))
+      if (const std::string name = it->path().filename(); name.ends_with(".glb"))
+        by_level[{std::atoi(name.c_str()), name}] = it->file_size(failure);
+    std::size_t bytes = 0;
+    for (const auto& [level_and_name, size] : by_level) {
+      if ((bytes += size) > most_bytes) break;
+      const auto content = tile(view.tiles(), level_and_name.second);
+      if (content) files["a/tiles/" + level_and_name.second] = to_base64(*content);
+    }
+    keep_only(files, shown["root"]);
+    files["a/tiles/tileset.json"] = shown.dump();
+  }
+  std::string page(page_html());
+  page = replaced(page, R"(<link rel="stylesheet" href="viewer.css">)",
+                  "<style>" + std::string(page_style()) + "</style>");
+  page = replaced(page, R"(<script type="module" src="viewer.js"></script>)",
+                  "<script type=\"application/json\" id=\"files\">" + embedded(files) +
+                      "</script>\n<script type=\"module\">" + inline_script(page_script()) + "</script>");
+  return page;
+}
+
+}  // namespace revisit::cli

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+import "./style.css";
+import { chartsTab } from "./charts_tab";
+import { h } from "./dom";
+import { isReport, readJson } from "./files";
+import { LoopTab } from "./loop_tab";
+import { MapTab } from "./map_tab";
+import { positionOf, toView, type Loop, type Triple, type View } from "./model";
+import type { ColourBy } from "./points";
+import { Side, Stage } from "./stage";
+import { Timeline } from "./timeline";
+
+const app = document.getElementById("app")!;
+
+function heightsOf(view: View): [number, number] {
+  const z = view.scans.pose.map((pose) => pose[2]!).sort((a, b) => a - b);
+  return z.length > 0 ? [z[0]! - 3, z.at(-1)! + 10] : [0, 10];
+}
+
+/** A round length that is about a fifth of the picture. */
+function showScale(element: HTMLElement, metresAPixel: number) {
+  const most = 160 * metresAPixel, power = 10 ** Math.floor(Math.log10(most));
+  const metres = [5, 2, 1].map((f) => f * power).find((length) => length <= most) ?? power;
+  element.style.width = `${metres / metresAPixel}px`;
+  element.textContent = metres >= 1000 ? `${metres / 1000} km` : `${metres} m`;
+}
+
+function start(views: View[]) {
+  const canvas = h("canvas", { id: "stage", tabindex: 0, "aria-label": "The map in three dimensions" });
+  const notice = h("p", { id: "notice", role: "status", hidden: true });
+  const scale = h("div", { id: "scale" }), up = h("div", { id: "up", title: "The map's y axis" }, "y");
+  const stageBox = h("main", {}, canvas, scale, up, notice);
+  app.replaceChildren(stageBox);
+  const stage = new Stage(canvas);
+  for (const view of views) stage.add(new Side(view));
+  const first = () => stage.sides[0]!;
+  const view = views[0]!;
+
+  let selected: Loop | null = null;
+  const loopTab = new LoopTab((by) => step(by));
+  const select = (loop: Loop | null, side = first()) => {
+    selected = loop;
+    for (const each of stage.sides) each.loops.select(each === side ? loop : null);
+    loopTab.show(side.view, loop);
+    if (loop) tabs.show("Loop");
+    stage.draw();
+  };
+  const step = (by: number) => {
+    const loops = first().loops.shown.length > 0 ? first().loops.shown : first().view.loops.filter((l) => l.accepted || first().loops.showRefused);
+    if (loops.length === 0) return;
+    const at = selected ? loops.indexOf(selected) : by > 0 ? -1 : 0;
+    const loop = loops[(at + by + loops.length) % loops.length]!;
+    const place = positionOf(first().view, loop.query);
+    if (place) stage.lookAt(place);
+    select(loop);
+  };
+
+  const heights = heightsOf(view);
+  const mapTab = new MapTab(stage, view, heights);
+  for (const side of stage.sides) side.points?.material.uniforms.heights!.value.set(...heights);
+  const setThreshold = (score: number) => {
+    first().loops.threshold = score;
+    first().loops.draw();
+    stage.draw();
+  };
+  const tabs = makeTabs({ Map: mapTab.root, Loop: loopTab.root, Charts: chartsTab(view, setThreshold) });
+  const timeline = new Timeline(stage, first());
+  const title = views.map((each) => each.title).join("   |   ");
+  const accepted = view.loops.filter((l) => l.accepted).length, wrong = view.loops.filter((l) => l.accepted && l.right === false).length;
+  const summary = `${view.scans.frame.length} scans, ${accepted} loops` + (view.has_truth ? `, ${wrong} of them false` : "");
+  const header = h("header", {}, h("h1", {}, title), h("p", {}, summary + (view.run.interrupted ? "; interrupted" : "")));
+  app.replaceChildren(header, stageBox, tabs.root, timeline.root);
+
+  const say = (text: string) => {
+    notice.textContent = text;
+    notice.hidden = text === "";
+  };
+  stage.onDraw = () => {
+    showScale(scale, stage.metresAPixel());
+    up.style.transform = `rotate(${stage.controls.getAzimuthalAngle()}rad)`;
+    mapTab.status.textContent = `${stage.drawn.toLocaleString("en")} points drawn`;
+    const failure = stage.sides.map((side) => side.points?.failure).find((text) => text);
+    if (failure) say(`A part of the map cannot be shown: ${failure}`);
+    canvas.dataset.drawn = String(stage.drawn);
+    canvas.dataset.loading = String(stage.sides.some((side) => side.points?.isLoading));
+  };
+  if (!view.has_tiles) say("No tiles: the points are not shown. revisit export MAP --as tiles writes them.");
+  if (view.scans.frame.length === 0) say("No trajectory: these results have no poses. The charts show which scans met.");
+
+  let pressed: [number, number] = [0, 0], measured: Triple | null = null;
+  canvas.addEventListener("pointerdown", (event) => (pressed = [event.offsetX, event.offsetY]));
+  canvas.addEventListener("click", (event) => {
+    const { offsetX: x, offsetY: y } = event;
+    if (Math.hypot(x - pressed[0], y - pressed[1]) > 5) return;
+    if (mapTab.isMeasuring) {
+      const point = stage.pick(x, y)?.toArray() as Triple | undefined;
+      if (!point) return void (mapTab.measured.textContent = "No point there.");
+      const [dx, dy, dz] = measured ? [0, 1, 2].map((i) => point[i]! - measured![i]!) as Triple : [0, 0, 0];
+      mapTab.measured.textContent = measured
+        ? `${Math.hypot(dx, dy, dz).toFixed(2)} m apart; ${Math.hypot(dx, dy).toFixed(2)} m on the ground, ${dz.toFixed(2)} m in height`
+        : `${point.map((v) => v.toFixed(2)).join(", ")} m; now the other one`;
+      measured = measured ? null : point;
+      return;
+    }
+    stage.sides.forEach((side, i) => {
+      const found = side.loops.group.visible ? side.loops.at(x, y, 12, (place) => stage.toPixels(place, i)) : null;
+      if (found) select(found, side);
+    });
+  });
+  addEventListener("keydown", (event) => {
+    if (event.target instanceof HTMLInputElement || event.target instanceof HTMLSelectElement || event.ctrlKey || event.metaKey) return;
+    const colours: Record<string, ColourBy> = { "1": "intensity", "2": "height", "3": "time", "4": "session" };
+    if (colours[event.key]) mapTab.colourBy(colours[event.key]!);
+    else if (event.key === "n") step(1);
+    else if (event.key === "p") step(-1);
+    else if (event.key === "t") stage.frame(true);
+    else if (event.key === "c") stage.frame(false);
+    else if (event.key === "," || event.key === ".") timeline.step(event.key === "." ? 1 : -1);
+    else if (event.key === " " && !(event.target instanceof HTMLButtonElement)) timeline.toggle();
+    else if (event.key === "Escape") select(null);
+    else return;
+    event.preventDefault();
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => stage.draw());
+  stage.frame(view.scans.frame.length > 0);
+  if (!isReport) listen(stage, say);
+}
+
+/** While a map is made its trajectory and loops are read anew. */
+function listen(stage: Stage, say: (text: string) => void) {
+  const events = new EventSource("events");
+  events.onmessage = async () => {
+    try {
+      for (const side of [...stage.sides]) {
+        const name = side.view.name, view = toView(name, await readJson(`${name}/view.json`));
+        if (view.has_tiles !== side.view.has_tiles) return location.reload();
+        const isFirst = side.view.scans.frame.length === 0;
+        stage.replace(side, new Side(view, side.points));
+        if (isFirst) stage.frame(true);
+      }
+    } catch (problem) {
+      say((problem as Error).message);
+    }
+  };
+}
+
+function makeTabs(bodies: Record<string, HTMLElement>) {
+  const buttons = new Map<string, HTMLElement>();
+  const show = (name: string) => {
+    for (const [each, body] of Object.entries(bodies)) {
+      body.hidden = each !== name;
+      buttons.get(each)!.setAttribute("aria-selected", String(each === name));
+    }
+  };
+  const bar = h("div", { role: "tablist" });
+  for (const name of Object.keys(bodies)) {
+    const button = h("button", { type: "button", role: "tab", click: () => {
+      root.classList.remove("closed");
+      show(name);
+    } }, name);
+    buttons.set(name, button);
+    bar.append(button);
+  }
+  const close = h("button", { type: "button", class: "close", "aria-label": "Hide or show the panel", click: () => root.classList.toggle("closed") }, "▾");
+  bar.append(close);
+  const root = h("aside", {}, bar, ...Object.values(bodies));
+  show(Object.keys(bodies)[0]!);
+  return { root, show };
+}
+
+try {
+  const { views } = await readJson("views.json");
+  start(await Promise.all(["a", "b"].slice(0, views).map(async (name) => toView(name, await readJson(`${name}/view.json`)))));
+} catch (problem) {
+  app.replaceChildren(h("p", { id: "notice", role: "alert" }, `These results cannot be shown: ${(problem as Error).message}`));
+}

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// The map's points, streamed: 3D Tiles of glTF points with `_intensity` and `_labels` (docs/formats.md).
+import * as THREE from "three";
+import { TilesRenderer } from "3d-tiles-renderer/three";
+import { kinds, textureOf, type Scale } from "./colours";
+import { isReport, read } from "./files";
+
+export type ColourBy = "intensity" | "height" | "time" | "session";
+export const scaleOf: Record<ColourBy, Scale | null> = { intensity: "grey", height: "viridis", time: "cividis", session: null };
+
+const most_points_drawn = 2_000_000;
+const finest_px = 2;  // between points, on the screen
+
+const vertex = `
+attribute float _intensity;
+attribute vec4 _labels;
+uniform int colourBy;
+uniform float size, lowZ, highZ, brightness;
+uniform vec2 heights;
+uniform sampler2D scale;
+uniform vec3 kinds[8];
+varying vec3 colour;
+void main() {
+  vec4 world = modelMatrix * vec4(position, 1.0);
+  gl_Position = projectionMatrix * viewMatrix * world;
+  gl_PointSize = size;
+  if (world.z < lowZ || world.z > highZ) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  float at = colourBy == 0 ? 0.1 + 0.9 * _intensity * brightness
+           : colourBy == 1 ? (world.z - heights.x) / (heights.y - heights.x)
+                           : (_labels.z + 256.0 * _labels.w) / 65535.0;
+  int kind = int(mod(_labels.y, 8.0));
+  colour = colourBy == 3 ? kinds[kind] : texture2D(scale, vec2(clamp(at, 0.0, 1.0), 0.5)).rgb;
+}`;
+const fragment = `
+varying vec3 colour;
+void main() {
+  if (dot(gl_PointCoord - 0.5, gl_PointCoord - 0.5) > 0.25) discard;
+  gl_FragColor = vec4(colour, 1.0);
+}`;
+
+export class MapPoints {
+  readonly group = new THREE.Group();
+  readonly material = new THREE.ShaderMaterial({
+    vertexShader: vertex, fragmentShader: fragment,
+    uniforms: {
+      colourBy: { value: 0 }, size: { value: 2 }, lowZ: { value: -1e9 }, highZ: { value: 1e9 }, brightness: { value: 1 },
+      heights: { value: new THREE.Vector2(0, 10) }, scale: { value: textureOf("grey") },
+      kinds: { value: kinds.map((hex) => new THREE.Color().setStyle(hex, "")) },
+    },
+  });
+  private tiles: TilesRenderer | null = null;
+  failure = "";
+  onChange = () => {};
+
+  constructor(view: string) {
+    const tiles = new TilesRenderer(`${view}/tiles/tileset.json`);
+    this.tiles = tiles;
+    tiles.errorTarget = finest_px;
+    tiles.registerPlugin({ name: "files", fetchData: (url: string) => read(isReport ? url.slice(url.indexOf(`${view}/tiles/`)) : url) });
+    tiles.addEventListener("load-model", ({ scene }: any) => {
+      scene.traverse((object: THREE.Object3D) => {
+        if (!(object instanceof THREE.Points)) return;
+        object.material = this.material;
+      });
+      this.onChange();
+    });
+    tiles.addEventListener("load-error", ({ error, url }: any) => {
+      const name = String(url ?? "").split("/").pop();
+      if (isReport) return;  // finer tiles are not in it
+      this.failure = `${name}: ${error?.message ?? error}`;
+      this.onChange();
+    });
+    tiles.addEventListener("load-tileset", () => this.onChange());
+    this.group.add(tiles.group);
+  }
+
+  colourBy(by: ColourBy) {
+    const number = ["intensity", "height", "time", "session"].indexOf(by);
+    this.material.uniforms.colourBy!.value = number;
+    const scale = scaleOf[by];
+    if (scale) this.material.uniforms.scale!.value = textureOf(scale);
+  }
+
+  /** Loads what the camera wants; says how many points are drawn. */
+  update(camera: THREE.Camera, renderer: THREE.WebGLRenderer): number {
+    const tiles = this.tiles;
+    if (!tiles) return 0;
+    tiles.setCamera(camera);
+    tiles.setResolutionFromRenderer(camera, renderer);
+    camera.updateMatrixWorld();
+    tiles.update();
+    let drawn = 0;
+    tiles.group.traverseVisible((object: THREE.Object3D) => {
+      if (object instanceof THREE.Points) drawn += object.geometry.getAttribute("position").count;
+    });
+    if (drawn > most_points_drawn) tiles.errorTarget *= 1.2;
+    else if (drawn < most_points_drawn / 2 && tiles.errorTarget > finest_px) tiles.errorTarget /= 1.1;
+    return drawn;
+  }
+
+  get isLoading(): boolean {
+    const stats = (this.tiles as any)?.stats;
+    return stats ? stats.downloading + stats.parsing > 0 : false;
+  }
+
+  dispose() {
+    this.tiles?.dispose();
+    this.material.dispose();
+  }
+}

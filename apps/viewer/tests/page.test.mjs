@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page in a real browser: every view and every control.
+import assert from "node:assert/strict";
+import { cpSync, mkdirSync, readFileSync, rmSync, truncateSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
+import { after, test as add } from "node:test";
+import { browserIsMissing, close, difference, open, settle } from "./page.mjs";
+import { revisit, serve, slam, work } from "./server.mjs";
+import { writeTileset } from "./big_tileset.mjs";
+
+const test = (name, body) => add(name, { skip: browserIsMissing }, body);
+after(async () => {
+  await close();
+  rmSync(work, { recursive: true, force: true });
+});
+const tolerance = 12;  // of 255, root mean square of blocks
+let loop;
+const results = () => {
+  if (!loop) {
+    loop = slam("loop");
+    revisit("evaluate", loop.out, "--reference", loop.drive);
+  }
+  return loop.out;
+};
+const text = (page, selector) => page.locator(selector).innerText();
+const check = (page, label) => page.locator(".check").filter({ has: page.getByText(new RegExp(`^${label}`)) }).locator("input");
+const slide = (page, label, value) => page.locator(".row", { hasText: label }).locator("input").fill(String(value));
+
+test("the map is drawn, from above and from a corner", async (context) => {
+  const page = await open(context, await serve(context, results()));
+  assert.ok((await settle(page)) > 20_000);
+  assert.match(await text(page, "header"), /scans, \d+ loops, 0 of them false/);
+  assert.ok((await difference(page, "map_above")) < tolerance);
+  await page.getByText("From a corner").click();
+  await settle(page);
+  assert.ok((await difference(page, "map_corner")) < tolerance);
+  assert.deepEqual(page.problems, []);
+});
+
+test("every control of the map changes the picture", async (context) => {
+  const page = await open(context, await serve(context, results()));
+  await settle(page);
+  let before = await page.locator("#stage").screenshot();
+  const changes = async (what, act) => {
+    await act();
+    await settle(page);
+    const now = await page.locator("#stage").screenshot();
+    assert.ok(!now.equals(before), what);
+    before = now;
+  };
+  for (const by of ["intensity", "time", "session", "height"])
+    await changes(by, () => page.locator("select").selectOption(by));
+  await changes("size", () => slide(page, "Point size", 6));
+  await changes("lowest", () => slide(page, "Lowest shown", 1));
+  await changes("highest", () => slide(page, "Highest shown", 3));
+  for (const name of ["Points", "Trajectory, coloured", "Odometry, before", "Truth", "Loops, coloured"])
+    await changes(name, () => check(page, name).click());
+  await changes("loops again", () => check(page, "Loops, coloured").click());
+  await changes("refused", () => check(page, "Refused").click());
+  await changes("wheel", async () => (await page.locator("#stage").hover(), page.mouse.wheel(0, -600)));
+  await changes("intensity and brightness", async () => {
+    await check(page, "Points").click();
+    await page.keyboard.press("Escape");
+    await page.locator("select").selectOption("intensity");
+    await slide(page, "Brightness", 3);
+  });
+  assert.deepEqual(page.problems, []);
+});
+
+test("a loop shows both scans, both descriptors and the evidence", async (context) => {
+  const page = await open(context, await serve(context, results()));
+  await settle(page);
+  await page.keyboard.press("n");
+  await page.locator("figure").nth(1).waitFor();
+  assert.match(await text(page, "aside"), /Right: [\d.]+ m and [\d.]+° from the truth/);
+  assert.match(await text(page, "aside"), /free space\s+0\.\d\d/);
+  assert.equal(await page.locator("canvas.picture").count(), 4);
+  assert.ok((await difference(page, "loop")) < tolerance);
+  const first = await text(page, "h2");
+  await page.getByText("Next ▶").click();
+  assert.notEqual(await text(page, "h2"), first);
+  await page.getByText("◀ Previous").click();
+  assert.equal(await text(page, "h2"), first);
+  assert.deepEqual(page.problems, []);
+});
+
+test("a loop's line can be clicked, and touched", async (context) => {
+  const page = await open(context, await serve(context, results()), { hasTouch: true });
+  await settle(page);
+  await page.keyboard.press("n");  // its line is in the middle now
+  await page.keyboard.press("Escape");
+  const box = await page.locator("#stage").boundingBox();
+  await page.touchscreen.tap(box.x + box.width / 2, box.y + box.height / 2);
+  await page.locator("h2").waitFor();
+  assert.match(await text(page, "h2"), /Scan \d+ → \d+/);
+});
+
+test("charts have titles and units, and the threshold recolours the loops", async (context) => {
+  const page = await open(context, await serve(context, results()));
+  await page.getByRole("tab", { name: "Charts" }).click();
+  const titles = await page.locator("svg.chart .title").allTextContents();
+  for (const part of ["Precision and recall", "Probability", "Reliability", "Distance from the truth", "odometry alone", "Which scans met"])
+    assert.ok(titles.some((title) => title.includes(part)), part);
+  for (const axis of await page.locator("svg.chart").all()) assert.equal(await axis.locator(".axis").count(), 2);
+  assert.match(await text(page, "aside"), /ms/);
+  await settle(page);
+  const before = await page.locator("#stage").screenshot();
+  await page.locator(".row", { hasText: "Answers taken" }).locator("input").fill("5");
+  await settle(page);
+  assert.ok(!(await page.locator("#stage").screenshot()).equals(before));
+  assert.ok((await difference(page, "charts")) < tolerance);
+});
+
+test("the drive plays", async (context) => {
+  const page = await open(context, await serve(context, results()));
+  await settle(page);
+  await page.getByLabel("Play the drive").click();
+  await page.waitForTimeout(1500);
+  await page.getByLabel("Play the drive").click();
+  const seconds = parseFloat(await text(page, "#moment"));
+  assert.ok(seconds > 3 && seconds < 40, `ten times as fast as driven: ${seconds} s`);
+  await page.keyboard.press("Escape");
+  await page.keyboard.press(".");
+  assert.notEqual(parseFloat(await text(page, "#moment")), seconds);
+});
+
+test("two points are measured", async (context) => {
+  const page = await open(context, await serve(context, results()));
+  await settle(page);
+  await check(page, "Measure").click();
+  const box = await page.locator("#stage").boundingBox();
+  const click = async (from) => {  // some point there
+    for (let i = from; i < box.width; i += 7) {
+      await page.mouse.click(box.x + i, box.y + 0.45 * box.height);
+      if (!(await text(page, "#measured")).includes("No point")) return;
+    }
+  };
+  await click(60);
+  await click(250);
+  assert.match(await text(page, "#measured"), /[\d.]+ m apart; [\d.]+ m on the ground/);
+});
+
+test("it fits a telephone, and a large screen in the dark", async (context) => {
+  const address = await serve(context, results());
+  const small = await open(context, address, { viewport: { width: 360, height: 740 } });
+  await settle(small);
+  assert.equal(await small.evaluate(() => document.documentElement.scrollWidth), 360);
+  await small.getByLabel("Hide or show the panel").click();
+  assert.ok((await difference(small, "telephone")) < tolerance);
+  const large = await open(context, address, { viewport: { width: 3840, height: 2160 }, colorScheme: "dark" });
+  assert.equal(await large.evaluate(() => getComputedStyle(document.querySelector("aside")).backgroundColor), "rgb(24, 28, 34)");
+});
+
+test("a map of two sessions has a colour for each, from the map alone", async (context) => {
+  const { out } = slam("two", { length_m: 150 });
+  slam("two_b", { length_m: 150, day: 2 }, ["--into", out]);
+  mkdirSync(join(work, "alone"));
+  cpSync(join(out, "map.revisit"), join(work, "alone", "home.revisit"));
+  const page = await open(context, await serve(context, join(work, "alone", "home.revisit")));
+  await page.locator("select").selectOption("session");
+  assert.ok((await settle(page)) > 10_000);
+  assert.match(await text(page, "aside"), /session 0: two\.toml[\s\S]*session 1: two_b\.toml/);
+  assert.deepEqual(page.problems, []);
+});
+
+test("a run without loops, and one without poses, say so", async (context) => {
+  const { out } = slam("short", { length_m: 60 });
+  const page = await open(context, await serve(context, out));
+  await settle(page);
+  assert.match(await text(page, "header"), /, 0 loops/);
+  await page.getByRole("tab", { name: "Loop" }).click();
+  await page.getByText("Next ▶").click();
+  const bare = join(work, "bare");
+  mkdirSync(bare);
+  writeFileSync(join(bare, "candidates.csv"), "query,match,score,accepted,reason\n60,1,0.9,1,\n61,,0,0,no similar place\n");
+  writeFileSync(join(bare, "loops.csv"), "query,match,score,tx,ty,tz,qx,qy,qz,qw,inlier_ratio,rmse_m\n60,1,0.9,1,0,0,0,0,0,1,0.8,0.1\n");
+  const none = await open(context, await serve(context, bare));
+  assert.match(await text(none, "#notice"), /No trajectory/);
+  await none.getByRole("tab", { name: "Charts" }).click();
+  assert.match(await text(none, "aside"), /Which scans met/);
+  assert.deepEqual(page.problems, []);
+});
+
+test("hostile and broken files are shown as what they are", async (context) => {
+  const bad = join(work, "bad");
+  cpSync(results(), bad, { recursive: true });
+  const evil = '<img src=x onerror="document.title=1">';
+  const rows = readFileSync(join(bad, "evidence.csv"), "utf8").split("\n");
+  writeFileSync(join(bad, "evidence.csv"), [rows[0], `0,1,${evil}`, "1e999,nan,,,", ...rows.slice(1)].join("\n"));
+  writeFileSync(join(bad, "run.json"), JSON.stringify({ command: "slam", input: evil, version: evil, counts: { [evil]: 1 }, ms_per_scan: { [evil]: 1 } }));
+  truncateSync(join(bad, "tiles", "1_0_0_0.glb"), 60);
+  const page = await open(context, await serve(context, bad));
+  await settle(page);
+  assert.match(await text(page, "#notice"), /A part of the map cannot be shown: 1_0_0_0\.glb/);
+  await page.getByRole("tab", { name: "Charts" }).click();
+  assert.ok((await text(page, "aside")).includes("<img"));
+  assert.equal(await page.locator("aside img").count(), 0);
+  assert.equal(await page.title(), "revisit");
+  writeFileSync(join(bad, "tiles", "tileset.json"), "{");
+  const blank = await open(context, await serve(context, bad));
+  await blank.locator("#notice").waitFor();
+  assert.match(await text(blank, "#notice"), /cannot be shown/);
+});
+
+test("two results stand side by side under one camera", async (context) => {
+  const { out } = slam("other", { length_m: 150 });
+  const page = await open(context, await serve(context, results(), "--compare", out));
+  await settle(page);
+  assert.match(await text(page, "h1"), /loop\s+\|\s+.*other/);
+  assert.ok((await difference(page, "compare")) < tolerance);
+  assert.deepEqual(page.problems, []);
+});
+
+test("a report is one file that needs no server", async (context) => {
+  const file = join(work, "report.html");
+  revisit("view", results(), "--report", file, "--report-mb", "1");
+  const page = await open(context, `file://${file}`);
+  assert.ok((await settle(page)) > 5_000);
+  await page.keyboard.press("n");
+  assert.match(await text(page, "aside"), /Evidence/);
+  assert.deepEqual(page.problems, []);
+});
+
+test("it grows while slam works, and nothing is lost when it is closed", async (context) => {
+  const view = join(work, "live");
+  mkdirSync(view);
+  cpSync(join(results(), "map.revisit"), join(view, "map.revisit"));
+  const page = await open(context, await serve(context, view));
+  const scans = await page.evaluate(async () => (await (await fetch("a/view.json")).json()).scans.frame.length);
+  assert.ok(scans > 300);
+  const changed = page.evaluate(() => new Promise((resolve) => (new EventSource("events").onmessage = (event) => resolve(event.data))));
+  await page.waitForTimeout(1500);
+  writeFileSync(join(view, "candidates.csv"), "query,match,score,accepted,reason\n");
+  assert.equal(await changed, "changed");
+});
+
+test("ten million points are streamed, not loaded", async (context) => {
+  const big = join(work, "big");
+  cpSync(results(), big, { recursive: true });
+  const files = writeTileset(join(big, "tiles"), 10_000_000);
+  const page = await open(context, "about:blank");
+  let requests = 0;
+  page.on("request", (request) => (requests += request.url().endsWith(".glb") ? 1 : 0));
+  await page.goto(await serve(context, big));
+  let drawn = 0;
+  for (let i = 0; i < 30 && drawn === 0; ++i) drawn = await settle(page);
+  assert.ok(drawn > 0 && drawn <= 2_000_000, `${drawn} drawn`);
+  assert.ok(requests > 0 && requests < files / 2, `${requests} of ${files} tiles`);
+});
