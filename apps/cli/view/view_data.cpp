@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
+#include <set>
 #include <sstream>
 #include <utility>
 
@@ -184,8 +185,10 @@ Result<ViewData> read_map_view(const fs::path& map_file) {
   data.command = "slam";
   for (const StoredSession& session : *sessions) data.sessions.push_back(session.recording);
   if (!sessions->empty()) data.input = sessions->back().recording;
+  std::set<FrameId> keyframes;  // another program may have added some since
+  for (const auto& keyframe : map->stored().keyframes) keyframes.insert(keyframe.frame.frame);
   for (const StoredScan& scan : *scans)
-    if (map->graph().nodes().size() > 0)
+    if (keyframes.contains(scan.keyframe))
       data.scans.push_back({scan.frame, scan.stamp_s, scan.frame == scan.keyframe,
                             map->T_map_lidar(scan.keyframe) * scan.T_keyframe_lidar, scan.T_odom_lidar});
   data.answers = *answers;

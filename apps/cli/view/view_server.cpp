@@ -165,9 +165,9 @@ class ViewServer::Implementation {
   }
 
   Result<int> listen() {
-    const int port = options_.port == 0 ? server_.bind_to_any_port(options_.host.c_str())
-                     : server_.bind_to_port(options_.host.c_str(), options_.port) ? options_.port
-                                                                                  : -1;
+    const int port = options_.port == 0                                   ? server_.bind_to_any_port(options_.host)
+                     : server_.bind_to_port(options_.host, options_.port) ? options_.port
+                                                                          : -1;
     if (port <= 0)
       return Error{"cannot listen at " + options_.host + ":" + std::to_string(options_.port) +
                    "; name another port with --port, or 0 for any that is free"};

@@ -25,6 +25,12 @@ function showScale(element: HTMLElement, metresAPixel: number) {
   element.textContent = metres >= 1000 ? `${metres / 1000} km` : `${metres} m`;
 }
 
+function summaryOf(view: View): string {
+  const accepted = view.loops.filter((loop) => loop.accepted), wrong = accepted.filter((loop) => loop.right === false);
+  return `${view.scans.frame.length} scans, ${accepted.length} loops` + (view.has_truth ? `, ${wrong.length} of them false` : "") +
+    (view.run.interrupted ? "; interrupted" : "");
+}
+
 function start(views: View[]) {
   const canvas = h("canvas", { id: "stage", tabindex: 0, "aria-label": "The map in three dimensions" });
   const notice = h("p", { id: "notice", role: "status", hidden: true });
@@ -66,9 +72,8 @@ function start(views: View[]) {
   const tabs = makeTabs({ Map: mapTab.root, Loop: loopTab.root, Charts: chartsTab(view, setThreshold) });
   const timeline = new Timeline(stage, first());
   const title = views.map((each) => each.title).join("   |   ");
-  const accepted = view.loops.filter((l) => l.accepted).length, wrong = view.loops.filter((l) => l.accepted && l.right === false).length;
-  const summary = `${view.scans.frame.length} scans, ${accepted} loops` + (view.has_truth ? `, ${wrong} of them false` : "");
-  const header = h("header", {}, h("h1", {}, title), h("p", {}, summary + (view.run.interrupted ? "; interrupted" : "")));
+  const summary = h("p", {}, summaryOf(view));
+  const header = h("header", {}, h("h1", {}, title), summary);
   app.replaceChildren(header, stageBox, tabs.root, timeline.root);
 
   const say = (text: string) => {
@@ -123,11 +128,11 @@ function start(views: View[]) {
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => stage.draw());
   stage.frame(view.scans.frame.length > 0);
-  if (!isReport) listen(stage, say);
+  if (!isReport) listen(stage, say, (now) => (summary.textContent = summaryOf(now)));
 }
 
 /** While a map is made its trajectory and loops are read anew. */
-function listen(stage: Stage, say: (text: string) => void) {
+function listen(stage: Stage, say: (text: string) => void, summarise: (view: View) => void) {
   const events = new EventSource("events");
   events.onmessage = async () => {
     try {
@@ -135,6 +140,7 @@ function listen(stage: Stage, say: (text: string) => void) {
         const name = side.view.name, view = toView(name, await readJson(`${name}/view.json`));
         if (view.has_tiles !== side.view.has_tiles) return location.reload();
         const isFirst = side.view.scans.frame.length === 0;
+        if (side === stage.sides[0]) summarise(view);
         stage.replace(side, new Side(view, side.points));
         if (isFirst) stage.frame(true);
       }
