@@ -136,7 +136,7 @@ class Node:
             arguments.append(f"_map:={map}")
         self.log = open(os.path.join(WORK, "node.log"), "a+")
         self.process = subprocess.Popen([NODE, *arguments], stdout=self.log, stderr=subprocess.STDOUT)
-        wait_until(lambda: all(s.get_num_connections() for s in self.subscribers[:2]))
+        wait_until(lambda: all(s.get_num_connections() for s in self.subscribers[:2]) or self.process.poll() is not None)
 
     def last(self, topic):
         return self.heard[topic][-1]
