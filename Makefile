@@ -50,7 +50,7 @@ configure: packages | viewer
 
 # The page of `revisit view`, which the program carries: rebuilt where its sources are newer.
 viewer: apps/viewer/dist/viewer.js
-apps/viewer/dist/viewer.js: apps/viewer/node_modules/.package-lock.json $(wildcard apps/viewer/src/*) apps/viewer/index.html apps/viewer/vite.config.js
+apps/viewer/dist/viewer.js: apps/viewer/node_modules/.package-lock.json $(wildcard apps/viewer/src/*) apps/viewer/index.html apps/viewer/vite.config.js apps/viewer/tsconfig.json apps/viewer/package.json
 	@npm run build --prefix apps/viewer --silent
 	@touch $@
 apps/viewer/node_modules/.package-lock.json: apps/viewer/package-lock.json | packages

@@ -104,7 +104,8 @@ Status export_points(const SavedMap& map, const Part& part, const ExportOptions&
   const fs::path out = options.out, scratch = out / ".export.part";
   std::error_code failure;
   if (options.as == "tiles" && fs::exists(out / "tiles", failure) &&
-      !fs::exists(out / "tiles" / "tileset.json", failure))
+      !fs::exists(out / "tiles" / "tileset.json", failure) &&
+      !fs::exists(out / "tiles" / "tiles.json", failure))  // of earlier versions
     return Error{(out / "tiles").string() + ": is there already and holds no tileset.json; name another folder"};
   fs::create_directories(scratch, failure);
   if (failure) return Error{scratch.string() + ": cannot be created: " + failure.message()};

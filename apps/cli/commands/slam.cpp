@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <chrono>
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <thread>
 #include <tuple>
 
 #include <revisit/core/stopwatch.hpp>
@@ -294,8 +296,11 @@ int slam(const SlamOptions& options) {
   auto writer =
       ResultWriter::create(out, ResultWriter::Existing::kReplace);  // whether there was a map is decided above
   if (!writer) return fail(writer.error());
+  if (std::error_code failure; !options.resume && fs::exists(out / "tiles" / "tileset.json", failure))
+    fs::remove_all(out / "tiles", failure);  // of another map
   EvidenceFile evidence(out, options.resume);
-  const auto viewer = options.is_viewed ? look_at(out) : Result<std::unique_ptr<ViewServer>>(nullptr);
+  const auto viewer = options.is_viewed ? look_at(options.into.empty() ? out : fs::path(options.into))
+                                        : Result<std::unique_ptr<ViewServer>>(nullptr);
   if (!viewer) return fail(viewer.error());
   listen_for_interrupt();
   Stopwatch watch;
@@ -327,6 +332,10 @@ int slam(const SlamOptions& options) {
   if (run.interrupted) {
     print_log()(LogLevel::kWarning, "interrupted: continue with --resume");
     return kInterrupted;
+  }
+  if (*viewer) {
+    std::cout << "Look at it: " << (*viewer)->address() << "   Ctrl-C ends." << std::endl;
+    while (!interrupted()) std::this_thread::sleep_for(std::chrono::milliseconds(100));
   }
   return run.skipped.empty() && run.counts["untracked"] == 0 ? kDone : kDoneWithReservations;
 }

@@ -70,6 +70,8 @@ Status make_tiles(ResultsView& view) {
 int view(const ViewOptions& options) {
   if (const Status status = check_output(options.report.empty() ? "report.html" : options.report, ".html"); !status)
     return fail(status.error(), kUsage);
+  if (!options.report.empty() && !options.other.empty())
+    return fail({"--report holds one result; leave out --compare"}, kUsage);
   std::vector<std::shared_ptr<ResultsView>> views;
   for (const std::string& path : {options.results, options.other}) {
     if (path.empty()) continue;
@@ -79,6 +81,7 @@ int view(const ViewOptions& options) {
       if (const Status made = make_tiles(**opened); !made)
         return fail(made.error(), interrupted() ? kInterrupted : kFailed);
     if (const auto json = (*opened)->json(); !json) return fail(json.error());  // before a page shows nothing
+    if (!is_loopback(options.host)) (*opened)->forbid_recording();
     views.push_back(*std::move(opened));
   }
   if (page_html().empty())

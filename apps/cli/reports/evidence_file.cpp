@@ -2,11 +2,27 @@
 #include "reports/evidence_file.hpp"
 
 #include <iomanip>
+#include <iterator>
+#include <system_error>
 
 namespace revisit::cli {
 
+namespace {
+
+// A run that was killed may have left half a row.
+void cut_to_whole_rows(const std::string& file) {
+  std::ifstream stream(file, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  std::error_code ignored;
+  if (!text.empty() && !text.ends_with('\n')) std::filesystem::resize_file(file, text.rfind('\n') + 1, ignored);
+}
+
+}  // namespace
+
 EvidenceFile::EvidenceFile(const std::filesystem::path& folder, bool goes_on)
-    : file_((folder / "evidence.csv").string()), stream_(file_, goes_on ? std::ios::app : std::ios::trunc) {
+    : file_((folder / "evidence.csv").string()) {
+  if (goes_on) cut_to_whole_rows(file_);
+  stream_.open(file_, goes_on ? std::ios::app : std::ios::trunc);
   stream_ << std::setprecision(10);
   if (stream_.tellp() == 0)
     stream_ << "query,match,inlier_ratio,inlier_share,free_space_agreement,intensity_agreement,rmse_m,overlap,"
@@ -28,6 +44,7 @@ Status EvidenceFile::add(const Detection& detection) {
       stream_ << ',' << value;
     stream_ << '\n';
   }
+  stream_.flush();
   return stream_ ? ok() : Status(Error{file_ + ": cannot be written"});
 }
 

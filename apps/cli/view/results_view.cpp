@@ -77,6 +77,7 @@ Result<std::string> ResultsView::json() {
 
 // The one that was worked on, where it is still there.
 Result<const Recording*> ResultsView::recording() {
+  if (is_recording_forbidden_) return Error{"scans are shown on the machine of the recording only"};
   if (!recording_) {
     const auto run = read_run(folder_ / "run.json");
     if (!run) return run.error();
@@ -107,14 +108,11 @@ Result<std::vector<Point>> ResultsView::points(FrameId frame) {
     }
     const auto is_there = store_->has(frame);
     if (!is_there) return is_there.error();
-    if (*is_there) {
-      auto points = read_map_points(*store_, frame);
-      if (!points || !points->empty()) return points;
-    }
+    return *is_there ? read_map_points(*store_, frame) : Error{to_text(frame) + " is no key frame of the map"};
   }
   const auto source = recording();
   if (!source) return source.error();
-  auto scan = scan_of(**source, in_recording(frame));
+  auto scan = scan_of(**source, frame);
   if (!scan) return scan.error();
   return std::move(scan->points);
 }

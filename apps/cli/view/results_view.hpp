@@ -31,7 +31,8 @@ class ResultsView {
 
   /// view.json, made anew from the files as they are.
   Result<std::string> json();
-  /// The points of a key frame (of a scan, where the recording is at hand), in its LiDAR frame.
+  /// The points of a key frame, in its LiDAR frame; none where its place was known already. Without a map, of a scan of
+  /// the recording that run.json names.
   Result<std::vector<Point>> points(FrameId frame);
   /// Absent where the map keeps none for this frame: its place was known already.
   Result<std::optional<IntensityScanContext>> descriptor(FrameId frame);
@@ -39,6 +40,8 @@ class ResultsView {
   /// `progress(done, all)` counts key frames and stops the work by returning false. Not beside other calls.
   Status make_tiles(const std::function<bool(std::size_t, std::size_t)>& progress);
   bool has_tiles() const;
+  /// Nothing outside the folder is read from here on, not even the recording.
+  void forbid_recording() { is_recording_forbidden_ = true; }
   const std::filesystem::path& folder() const { return folder_; }
   const std::filesystem::path& tiles() const { return tiles_; }
   bool has_map() const { return !map_file_.empty(); }
@@ -48,6 +51,7 @@ class ResultsView {
   ResultsView() = default;
   Result<const Recording*> recording();
 
+  bool is_recording_forbidden_ = false;
   std::mutex mutex_;
   std::filesystem::path folder_, map_file_, tiles_;
   std::filesystem::path temporary_;        ///< empty where there is none

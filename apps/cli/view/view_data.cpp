@@ -2,6 +2,7 @@
 #include "view/view_data.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <iterator>
@@ -84,8 +85,14 @@ Json read_run_facts(const fs::path& file) {
   const Json run = Json::parse(stream, nullptr, false);
   Json facts = Json::object();
   if (!run.is_object()) return facts;
-  for (const char* name : {"version", "counts", "ms_per_scan", "interrupted"})
-    if (run.contains(name)) facts[name] = run[name];
+  for (const char* name : {"counts", "ms_per_scan"}) {
+    if (!run.contains(name) || !run[name].is_object()) continue;
+    for (const auto& [key, value] : run[name].items())
+      if (value.is_number()) facts[name][key] = value;
+  }
+  if (run.contains("version") && run["version"].is_string()) facts["version"] = run["version"];
+  facts["interrupted"] =
+      run.contains("interrupted") && run["interrupted"].is_boolean() && run["interrupted"].get<bool>();
   return facts;
 }
 
@@ -148,7 +155,8 @@ Json loops_of(const ViewData& data, const Reference& reference, const fs::path& 
     if (const auto found = evidence.find({answer.query.value, answer.match->value}); found != evidence.end()) {
       const Json& e = found->second;
       row["evidence"] = e;
-      if (e.contains("qw") && e.contains("tx"))
+      const std::array numbers{"tx", "ty", "tz", "qx", "qy", "qz", "qw"};
+      if (std::all_of(numbers.begin(), numbers.end(), [&](const char* name) { return e.contains(name); }))
         row["pose"] = {e["tx"], e["ty"], e["tz"], e["qx"], e["qy"], e["qz"], e["qw"]};
       if (e.contains("log_odds")) row["probability"] = 1.0 / (1.0 + std::exp(-e["log_odds"].get<double>()));
     }
@@ -185,12 +193,19 @@ Result<ViewData> read_map_view(const fs::path& map_file) {
   data.command = "slam";
   for (const StoredSession& session : *sessions) data.sessions.push_back(session.recording);
   if (!sessions->empty()) data.input = sessions->back().recording;
-  std::set<FrameId> keyframes;  // another program may have added some since
-  for (const auto& keyframe : map->stored().keyframes) keyframes.insert(keyframe.frame.frame);
-  for (const StoredScan& scan : *scans)
-    if (keyframes.contains(scan.keyframe))
-      data.scans.push_back({scan.frame, scan.stamp_s, scan.frame == scan.keyframe,
-                            map->T_map_lidar(scan.keyframe) * scan.T_keyframe_lidar, scan.T_odom_lidar});
+  std::set<FrameId> keyframes;                          // another program may have added some since
+  for (const auto& keyframe : map->stored().keyframes)  // other parts have other coordinates
+    if (const FrameId frame = keyframe.frame.frame;
+        map->part(frame) == map->part(map->stored().keyframes.front().frame.frame))
+      keyframes.insert(frame);
+  std::map<int, Pose> T_map_odom;  // of each session: laid on where it begins
+  for (const StoredScan& scan : *scans) {
+    if (!keyframes.contains(scan.keyframe)) continue;
+    const Pose T_map_lidar = map->T_map_lidar(scan.keyframe) * scan.T_keyframe_lidar;
+    const auto odom = T_map_odom.try_emplace(session_of(scan.frame), T_map_lidar * scan.T_odom_lidar.inverse()).first;
+    data.scans.push_back(
+        {scan.frame, scan.stamp_s, scan.frame == scan.keyframe, T_map_lidar, odom->second * scan.T_odom_lidar});
+  }
   data.answers = *answers;
   for (const StoredEdge& edge : *edges)
     if (edge.loop) data.loops.push_back(*edge.loop);
@@ -209,7 +224,6 @@ Result<ViewData> read_detect_view(const fs::path& folder) {
   data.command = "detect";
   data.answers = *std::move(answers);
   data.loops = *std::move(loops);
-  std::map<FrameId, Pose> known;
   if (is_there(folder / "poses.txt")) {
     const auto poses = read_poses(folder / "poses.txt");
     if (!poses) return poses.error();
@@ -222,7 +236,9 @@ Result<ViewData> read_detect_view(const fs::path& folder) {
     for (const auto& [frame, entry] : to_trajectory(*poses, T_camera_lidar, {}).entries)
       data.scans.push_back({frame, entry.stamp_s, true, entry.T_world_lidar, std::nullopt});
   }
-  for (const ViewScan& scan : data.scans) data.truth[scan.frame] = scan.T_map_lidar;
+  auto truth = read_truth(folder);
+  if (!truth) return truth.error();
+  data.truth = *std::move(truth);
   return data;
 }
 

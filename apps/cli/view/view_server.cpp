@@ -113,6 +113,10 @@ class ViewServer::Implementation {
   Implementation(std::vector<std::shared_ptr<ResultsView>> views, const ServerOptions& options)
       : views_(std::move(views)), options_(options) {
     server_.new_task_queue = [] { return new httplib::ThreadPool(kThreads); };
+    server_.set_socket_options([](socket_t socket) {  // without SO_REUSEPORT: a port has one server
+      const int yes = 1;
+      setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+    });
     server_.set_read_timeout(kTimeout_s);
     server_.set_write_timeout(kTimeout_s);
     server_.set_keep_alive_timeout(kTimeout_s);
@@ -177,7 +181,8 @@ class ViewServer::Implementation {
   }
 
  private:
-  static constexpr std::size_t kThreads = 12;
+  static constexpr std::size_t kThreads = 48;
+  static constexpr int kMostListeners = 16;
   static constexpr std::time_t kTimeout_s = 5;
 
   httplib::Server::HandlerResponse admit(const Request& request, Response& response) {
@@ -220,17 +225,29 @@ class ViewServer::Implementation {
     response.set_content(*std::move(text), type);
   }
 
+  std::string state_of_all() const {
+    std::string state;
+    for (const auto& view : views_) state += state_of(*view);
+    return state;
+  }
+
   // Server-sent events: a message when the files have changed, at most one a second.
   void tell_changes(Response& response) {
+    if (++listeners_ > kMostListeners) {
+      --listeners_;
+      return refuse(response, 503, "too many pages listen");
+    }
     response.set_chunked_content_provider(
-        "text/event-stream", [this, last = state_of(*views_.front())](std::size_t, httplib::DataSink& sink) mutable {
+        "text/event-stream",
+        [this, last = state_of_all()](std::size_t, httplib::DataSink& sink) mutable {
           constexpr auto kStep = std::chrono::milliseconds(100);
           for (int i = 0; i < 10 && !is_ending_; ++i) std::this_thread::sleep_for(kStep);
-          const std::string now = state_of(*views_.front());
+          const std::string now = state_of_all();
           const std::string text = now == last ? ": nothing new\n\n" : "data: changed\n\n";
           last = now;
           return !is_ending_ && sink.write(text.data(), text.size());
-        });
+        },
+        [this](bool) { --listeners_; });
   }
 
   std::vector<std::shared_ptr<ResultsView>> views_;
@@ -238,6 +255,7 @@ class ViewServer::Implementation {
   httplib::Server server_;
   std::thread thread_;
   std::atomic<bool> is_ending_ = false;
+  std::atomic<int> listeners_ = 0;
 };
 
 Result<std::unique_ptr<ViewServer>> ViewServer::start(std::vector<std::shared_ptr<ResultsView>> views,
@@ -306,7 +324,7 @@ void keep_only(const nlohmann::json& files, nlohmann::json& node) {
 
 }  // namespace
 
-Result<std::string> view_report(ResultsView& view, std::size_t most_bytes) {
+Result<std::string> view_report(ResultsView& view, std::size_t most_bytes) try {
   const auto data = view.json();
   if (!data) return data.error();
   nlohmann::json files = {{"a/view.json", *data}, {"views.json", R"({"views":1})"}};
@@ -328,12 +346,17 @@ Result<std::string> view_report(ResultsView& view, std::size_t most_bytes) {
     files["a/tiles/tileset.json"] = shown.dump();
   }
   std::string page(page_html());
+  page = replaced(page, R"(<meta charset="utf-8">)",
+                  R"(<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; connect-src data: blob:; worker-src blob:; base-uri 'none'; form-action 'none'">)");
   page = replaced(page, R"(<link rel="stylesheet" href="viewer.css">)",
                   "<style>" + std::string(page_style()) + "</style>");
   page = replaced(page, R"(<script type="module" src="viewer.js"></script>)",
                   "<script type=\"application/json\" id=\"files\">" + embedded(files) +
                       "</script>\n<script type=\"module\">" + inline_script(page_script()) + "</script>");
   return page;
+} catch (const nlohmann::json::exception& problem) {
+  return Error{(view.tiles() / "tileset.json").string() + ": is no tileset: " + problem.what()};
 }
 
 }  // namespace revisit::cli

@@ -17,6 +17,8 @@ export function precisionRecall(view: View): { score: number; precision: number;
   });
 }
 
+const largest = (points: [number, number][], least: number): number => points.reduce((most, [, y]) => Math.max(most, y), least);
+
 function histogram(values: number[], bins: number): [number, number][] {
   const counts = new Array<number>(bins).fill(0);
   for (const value of values) counts[Math.min(bins - 1, Math.max(0, Math.floor(value * bins)))]!++;
@@ -75,11 +77,11 @@ function errorPart(view: View): HTMLElement | null {
     if (odometry[i]) before.push([stamp_s[i]! - start, distance(odometry[i]!, place)]);
   });
   if (after.length < 2 || view.command === "detect") return null;
-  const end = after.at(-1)![0], most = Math.max(0.1, ...after.map((p) => p[1]));
+  const end = after.at(-1)![0], most = largest(after, 0.1);
   return h("section", {}, chart("Distance from the truth, after closing loops", { title: "time, s", range: [0, end] }, { title: "m", range: [0, most * 1.05] },
     [{ points: after, colour: kinds[0]!, kind: "line" }]),
     before.length > 1 ? chart("The same of odometry alone", { title: "time, s", range: [0, end] },
-      { title: "m", range: [0, Math.max(...before.map((p) => p[1])) * 1.05] }, [{ points: before, colour: ofOdometry, kind: "line" }]) : null);
+      { title: "m", range: [0, largest(before, 0.1) * 1.05] }, [{ points: before, colour: ofOdometry, kind: "line" }]) : null);
 }
 
 function timePart(view: View): HTMLElement | null {
@@ -94,8 +96,10 @@ function timePart(view: View): HTMLElement | null {
 function matrixPart(view: View): HTMLElement | null {
   const accepted = view.loops.filter((loop) => loop.accepted);
   if (accepted.length === 0) return null;
-  const last = Math.max(...accepted.map((l) => l.query), ...view.scans.frame.slice(-1));
-  const of = (right: boolean): [number, number][] => accepted.filter((l) => (l.right === false) === !right).map((l) => [l.query, l.match]);
+  const place = (frame: number) => view.index.get(frame) ?? frame;  // sessions one after the other
+  const of = (right: boolean): [number, number][] =>
+    accepted.filter((l) => (l.right === false) === !right).map((l) => [place(l.query), place(l.match)]);
+  const last = largest(accepted.map((l) => [0, place(l.query)]), view.scans.frame.length);
   return h("section", {}, chart("Which scans met", { title: "scan (query)", range: [0, last] }, { title: "earlier scan (match)", range: [0, last] },
     [{ points: of(true), colour: kinds[0]!, kind: "dots" }, { points: of(false), colour: ofFalse, kind: "dots" }]));
 }

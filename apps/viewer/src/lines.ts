@@ -52,6 +52,14 @@ export class Trajectories {
     this.before.visible = false;
     this.truth.visible = false;
   }
+
+  dispose() {
+    for (const group of [this.after, this.before, this.truth])
+      for (const line of group.children as Line2[]) {
+        line.geometry.dispose();
+        (line.material as LineMaterial).dispose();
+      }
+  }
 }
 
 export class LoopLines {
@@ -61,7 +69,12 @@ export class LoopLines {
   shown: Loop[] = [];
   private selected: Loop | null = null;
 
-  constructor(private readonly view: View) {
+  constructor(private view: View) {
+    this.draw();
+  }
+
+  update(view: View) {
+    this.view = view;
     this.draw();
   }
 

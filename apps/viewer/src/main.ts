@@ -89,7 +89,8 @@ function start(views: View[]) {
     canvas.dataset.drawn = String(stage.drawn);
     canvas.dataset.loading = String(stage.sides.some((side) => side.points?.isLoading));
   };
-  if (!view.has_tiles) say("No tiles: the points are not shown. revisit export MAP --as tiles writes them.");
+  const noTiles = view.command === "detect" ? "No points: revisit slam makes a map." : "No points yet: they come with the finished map.";
+  if (!view.has_tiles) say(noTiles);
   if (view.scans.frame.length === 0) say("No trajectory: these results have no poses. The charts show which scans met.");
 
   let pressed: [number, number] = [0, 0], measured: Triple | null = null;
@@ -113,7 +114,7 @@ function start(views: View[]) {
     });
   });
   addEventListener("keydown", (event) => {
-    if (event.target instanceof HTMLInputElement || event.target instanceof HTMLSelectElement || event.ctrlKey || event.metaKey) return;
+    if (event.target instanceof HTMLSelectElement || event.ctrlKey || event.metaKey || event.altKey) return;
     const colours: Record<string, ColourBy> = { "1": "intensity", "2": "height", "3": "time", "4": "session" };
     if (colours[event.key]) mapTab.colourBy(colours[event.key]!);
     else if (event.key === "n") step(1);
@@ -121,32 +122,47 @@ function start(views: View[]) {
     else if (event.key === "t") stage.frame(true);
     else if (event.key === "c") stage.frame(false);
     else if (event.key === "," || event.key === ".") timeline.step(event.key === "." ? 1 : -1);
-    else if (event.key === " " && !(event.target instanceof HTMLButtonElement)) timeline.toggle();
+    else if (event.key === " " && !(event.target instanceof HTMLButtonElement || event.target instanceof HTMLInputElement)) timeline.toggle();
     else if (event.key === "Escape") select(null);
     else return;
     event.preventDefault();
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => stage.draw());
   stage.frame(view.scans.frame.length > 0);
-  if (!isReport) listen(stage, say, (now) => (summary.textContent = summaryOf(now)));
+  if (!isReport) listen(stage, say, (now) => {
+    summary.textContent = summaryOf(now);
+    timeline.update();
+    if (now.scans.frame.length > 0) say(now.has_tiles ? "" : noTiles);
+  });
 }
 
 /** While a map is made its trajectory and loops are read anew. */
-function listen(stage: Stage, say: (text: string) => void, summarise: (view: View) => void) {
+function listen(stage: Stage, say: (text: string) => void, update: (view: View) => void) {
   const events = new EventSource("events");
-  events.onmessage = async () => {
+  let isReading = false, isOld = false;
+  const read = async () => {
     try {
-      for (const side of [...stage.sides]) {
+      for (const side of stage.sides) {
         const name = side.view.name, view = toView(name, await readJson(`${name}/view.json`));
         if (view.has_tiles !== side.view.has_tiles) return location.reload();
         const isFirst = side.view.scans.frame.length === 0;
-        if (side === stage.sides[0]) summarise(view);
-        stage.replace(side, new Side(view, side.points));
+        side.update(view);
         if (isFirst) stage.frame(true);
       }
+      update(stage.sides[0]!.view);
+      stage.draw();
     } catch (problem) {
       say((problem as Error).message);
     }
+  };
+  events.onmessage = async () => {  // one after the other, and the last one always
+    if (isReading) return void (isOld = true);
+    isReading = true;
+    do {
+      isOld = false;
+      await read();
+    } while (isOld);
+    isReading = false;
   };
 }
 

@@ -8,7 +8,7 @@ import { isReport, read } from "./files";
 export type ColourBy = "intensity" | "height" | "time" | "session";
 export const scaleOf: Record<ColourBy, Scale | null> = { intensity: "grey", height: "viridis", time: "cividis", session: null };
 
-const most_points_drawn = 2_000_000;
+export const most_points_drawn = 2_000_000;
 const finest_px = 2;  // between points, on the screen
 
 const vertex = `
@@ -50,13 +50,14 @@ export class MapPoints {
   });
   private tiles: TilesRenderer | null = null;
   failure = "";
+  private isAdapting = false;
   onChange = () => {};
 
   constructor(view: string) {
     const tiles = new TilesRenderer(`${view}/tiles/tileset.json`);
     this.tiles = tiles;
     tiles.errorTarget = finest_px;
-    tiles.registerPlugin({ name: "files", fetchData: (url: string) => read(isReport ? url.slice(url.indexOf(`${view}/tiles/`)) : url) });
+    tiles.registerPlugin({ name: "files", fetchData: (url: string) => read(isReport ? url.slice(url.lastIndexOf(`${view}/tiles/`)) : url) });
     tiles.addEventListener("load-model", ({ scene }: any) => {
       scene.traverse((object: THREE.Object3D) => {
         if (!(object instanceof THREE.Points)) return;
@@ -82,7 +83,7 @@ export class MapPoints {
   }
 
   /** Loads what the camera wants; says how many points are drawn. */
-  update(camera: THREE.Camera, renderer: THREE.WebGLRenderer): number {
+  update(camera: THREE.Camera, renderer: THREE.WebGLRenderer, most = most_points_drawn): number {
     const tiles = this.tiles;
     if (!tiles) return 0;
     tiles.setCamera(camera);
@@ -93,14 +94,16 @@ export class MapPoints {
     tiles.group.traverseVisible((object: THREE.Object3D) => {
       if (object instanceof THREE.Points) drawn += object.geometry.getAttribute("position").count;
     });
-    if (drawn > most_points_drawn) tiles.errorTarget *= 1.2;
-    else if (drawn < most_points_drawn / 2 && tiles.errorTarget > finest_px) tiles.errorTarget /= 1.1;
+    const before = tiles.errorTarget;
+    if (drawn > most) tiles.errorTarget *= 1.2;
+    else if (drawn < most / 2 && before > finest_px) tiles.errorTarget = Math.max(finest_px, before / 1.1);
+    this.isAdapting = tiles.errorTarget !== before;
     return drawn;
   }
 
   get isLoading(): boolean {
     const stats = (this.tiles as any)?.stats;
-    return stats ? stats.downloading + stats.parsing > 0 : false;
+    return this.isAdapting || (stats ? stats.downloading + stats.parsing > 0 : false);
   }
 
   dispose() {

@@ -4,26 +4,40 @@ import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { LoopLines, Trajectories } from "./lines";
 import type { Triple, View } from "./model";
-import { MapPoints } from "./points";
+import { MapPoints, most_points_drawn } from "./points";
 
 export class Side {
   readonly scene = new THREE.Scene();
-  readonly trajectories: Trajectories;
+  trajectories: Trajectories;
   readonly loops: LoopLines;
   readonly points: MapPoints | null;
   readonly scan = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ size: 3, sizeAttenuation: false, color: "#e69f00" }));
   readonly robot = new THREE.Mesh(new THREE.ConeGeometry(1, 3, 12).rotateZ(-Math.PI / 2), new THREE.MeshBasicMaterial({ color: "#d55e00", depthTest: false }));
 
-  constructor(readonly view: View, points: MapPoints | null = null) {
+  constructor(public view: View) {
     this.trajectories = new Trajectories(view);
     this.loops = new LoopLines(view);
-    this.points = points ?? (view.has_tiles ? new MapPoints(view.name) : null);
+    this.points = view.has_tiles ? new MapPoints(view.name) : null;
     this.scan.frustumCulled = false;
     this.robot.renderOrder = 3;
     this.scan.visible = this.robot.visible = false;
     const { after, before, truth } = this.trajectories;
     this.scene.add(before, truth, after, this.loops.group, this.scan, this.robot);
     if (this.points) this.scene.add(this.points.group);
+  }
+
+  /** The same results, later: what is shown stays as it was chosen. */
+  update(view: View) {
+    this.view = view;
+    const old = this.trajectories;
+    this.trajectories = new Trajectories(view);
+    for (const name of ["after", "before", "truth"] as const) {
+      this.trajectories[name].visible = old[name].visible;
+      this.scene.remove(old[name]);
+      this.scene.add(this.trajectories[name]);
+    }
+    old.dispose();
+    this.loops.update(view);
   }
 }
 
@@ -53,12 +67,6 @@ export class Stage {
 
   add(side: Side) {
     this.sides.push(side);
-    if (side.points) side.points.onChange = () => this.draw();
-    this.draw();
-  }
-
-  replace(old: Side, side: Side) {
-    this.sides = this.sides.map((each) => (each === old ? side : each));
     if (side.points) side.points.onChange = () => this.draw();
     this.draw();
   }
@@ -121,9 +129,9 @@ export class Stage {
     const ray = new THREE.Raycaster();
     ray.params.Points.threshold = Math.max(0.2, 4 * this.metresAPixel());
     ray.setFromCamera(new THREE.Vector2(2 * ((x % width) / width) - 1, 1 - (2 * y) / this.canvas.clientHeight), this.camera);
-    const hits = ray.intersectObject(side.points.group, true);
-    hits.sort((a, b) => (a.distanceToRay ?? 0) - (b.distanceToRay ?? 0));
-    return hits[0]?.point ?? null;
+    const { lowZ, highZ } = side.points.material.uniforms;
+    const hits = ray.intersectObject(side.points.group, true);  // the nearest first
+    return hits.find(({ point }) => point.z >= lowZ!.value && point.z <= highZ!.value)?.point ?? null;
   }
 
   /** At the target. */
@@ -161,7 +169,7 @@ export class Stage {
       this.renderer.setViewport(i * part, 0, part, height);
       this.renderer.setScissor(i * part, 0, part, height);
       this.renderer.setClearColor(background);
-      if (side.points) this.drawn += side.points.update(this.camera, this.renderer);
+      if (side.points) this.drawn += side.points.update(this.camera, this.renderer, most_points_drawn / this.sides.length);
       this.renderer.clear();
       this.renderer.render(side.scene, this.camera);
     });

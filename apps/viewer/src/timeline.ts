@@ -21,6 +21,13 @@ export class Timeline {
     this.root = h("div", { id: "timeline", hidden: count === 0 }, this.button, this.input, this.label);
   }
 
+  /** After the view has grown. */
+  update() {
+    const count = this.side.view.scans.frame.length;
+    this.input.max = String(Math.max(0, count - 1));
+    this.root.hidden = count === 0;
+  }
+
   toggle() {
     if (this.playing) {
       clearInterval(this.playing);
@@ -28,8 +35,9 @@ export class Timeline {
     } else {
       const { stamp_s } = this.side.view.scans, last = stamp_s.length - 1;
       if (this.input.valueAsNumber >= last) this.show(0);
-      const aSecond = Math.max(1, last / Math.max(1, stamp_s[last]! - stamp_s[0]!)), times = 10;  // as fast as it was driven
-      const step = Math.max(1, Math.round((aSecond * times) / 10));
+      const steps = stamp_s.slice(1).map((t, i) => t - stamp_s[i]!).filter((t) => t > 0).sort((a, b) => a - b);
+      const aScan_s = steps[Math.floor(steps.length / 2)] ?? 0.1, times = 10;  // as fast as it was driven
+      const step = Math.max(1, Math.round((0.1 * times) / aScan_s));
       this.playing = window.setInterval(() => {
         if (this.input.valueAsNumber >= last) this.toggle();
         else this.show(Math.min(last, this.input.valueAsNumber + step));

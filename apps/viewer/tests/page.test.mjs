@@ -5,7 +5,7 @@ import { cpSync, mkdirSync, readFileSync, rmSync, truncateSync, writeFileSync } 
 import { join } from "node:path";
 import { after, test as add } from "node:test";
 import { browserIsMissing, close, difference, open, settle } from "./page.mjs";
-import { revisit, serve, slam, work } from "./server.mjs";
+import { revisit, serve, slam, start, work } from "./server.mjs";
 import { writeTileset } from "./big_tileset.mjs";
 
 const test = (name, body) => add(name, { skip: browserIsMissing }, body);
@@ -188,6 +188,7 @@ test("hostile and broken files are shown as what they are", async (context) => {
   const rows = readFileSync(join(bad, "evidence.csv"), "utf8").split("\n");
   writeFileSync(join(bad, "evidence.csv"), [rows[0], `0,1,${evil}`, "1e999,nan,,,", ...rows.slice(1)].join("\n"));
   writeFileSync(join(bad, "run.json"), JSON.stringify({ command: "slam", input: evil, version: evil, counts: { [evil]: 1 }, ms_per_scan: { [evil]: 1 } }));
+  writeFileSync(join(bad, "run.json"), JSON.stringify({ command: "slam", input: evil, version: evil, interrupted: evil, counts: { [evil]: 1, bad: evil }, ms_per_scan: { [evil]: 1, detect: null } }));
   truncateSync(join(bad, "tiles", "1_0_0_0.glb"), 60);
   const page = await open(context, await serve(context, bad));
   await settle(page);
@@ -221,17 +222,24 @@ test("a report is one file that needs no server", async (context) => {
   assert.deepEqual(page.problems, []);
 });
 
-test("it grows while slam works, and nothing is lost when it is closed", async (context) => {
-  const view = join(work, "live");
-  mkdirSync(view);
-  cpSync(join(results(), "map.revisit"), join(view, "map.revisit"));
-  const page = await open(context, await serve(context, view));
-  const scans = await page.evaluate(async () => (await (await fetch("a/view.json")).json()).scans.frame.length);
-  assert.ok(scans > 300);
-  const changed = page.evaluate(() => new Promise((resolve) => (new EventSource("events").onmessage = (event) => resolve(event.data))));
-  await page.waitForTimeout(1500);
-  writeFileSync(join(view, "candidates.csv"), "query,match,score,accepted,reason\n");
-  assert.equal(await changed, "changed");
+test("it grows while slam works, then shows the points, and nothing is lost when it is closed", async (context) => {
+  const { drive } = slam("template", { length_m: 60 });
+  const long = join(work, "long.toml");
+  writeFileSync(long, readFileSync(drive, "utf8").replace("length_m = 60", "length_m = 300"));
+  const out = join(work, "live"), { address, child } = await start("slam", long, "--out", out, "--view");
+  const page = await open(context, address);
+  const scans = async () => Number((await text(page, "header p")).match(/(\d+) scans/)[1]);
+  const first = await scans();
+  await page.locator("header p", { hasText: /[12]\d\d scans/ }).waitFor();
+  assert.ok((await scans()) > first);
+  await page.locator(".check", { hasText: "Odometry, before" }).locator("input").click();
+  let drawn = 0;
+  for (let i = 0; i < 60 && drawn < 10_000; ++i) drawn = await settle(page);
+  assert.ok(drawn > 10_000, "the page shows the map once it is there");
+  await page.close();
+  child.kill("SIGINT");
+  assert.equal(await new Promise((resolve) => child.on("exit", resolve)), 0);
+  assert.ok(readFileSync(join(out, "poses.tum"), "utf8").split("\n").length > 250);
 });
 
 test("ten million points are streamed, not loaded", async (context) => {

@@ -20,16 +20,23 @@ export function slam(name, options = {}, more = []) {
   return { drive: file, out };
 }
 
-export async function serve(context, ...args) {
-  const child = spawn(program, ["view", ...args, "--port", "0"], { stdio: ["ignore", "pipe", "pipe"] });
-  context.after(() => child.kill("SIGINT"));
+/** A command that serves a page, until the program has named its address. */
+export function start(...args) {
+  const child = spawn(program, args, { stdio: ["ignore", "pipe", "pipe"] });
   let said = "";
-  child.stderr.on("data", (text) => (said += text));
   return new Promise((resolve, reject) => {
-    child.stdout.on("data", (text) => {
-      const address = String(text).match(/http:\/\/\S+/);
-      if (address) resolve(address[0]);
-    });
-    child.on("exit", (code) => reject(new Error(`revisit view ended with ${code}: ${said}`)));
+    const listen = (text) => {
+      const address = (said += text).match(/http:\/\/\S+/);
+      if (address) resolve({ address: address[0], child });
+    };
+    child.stdout.on("data", listen);
+    child.stderr.on("data", listen);
+    child.on("exit", (code) => reject(new Error(`revisit ${args[0]} ended with ${code}: ${said}`)));
   });
+}
+
+export async function serve(context, ...args) {
+  const { address, child } = await start("view", ...args, ...(args.includes("--port") ? [] : ["--port", "0"]));
+  context.after(() => child.kill("SIGINT"));
+  return address;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The server of `revisit view`: what it gives, and what it does not.
 import assert from "node:assert/strict";
-import { mkdirSync, readdirSync, readFileSync, rmSync, symlinkSync, writeFileSync } from "node:fs";
+import { cpSync, mkdirSync, readdirSync, readFileSync, rmSync, symlinkSync, writeFileSync } from "node:fs";
 import { connect } from "node:net";
 import { join } from "node:path";
 import { after, test } from "node:test";
@@ -110,6 +110,43 @@ test("beyond this machine it asks for the token", async (context) => {
   const cookie = first.headers.get("set-cookie");
   assert.match(cookie, /HttpOnly; SameSite=Strict/);
   assert.equal((await fetch(`${here}a/view.json`, { headers: { Cookie: cookie.split(";")[0] } })).status, 200);
+});
+
+test("a second page has an address of its own", async (context) => {
+  const first = await serve(context, out, "--port", "8137"), second = await serve(context, out, "--port", "8137");
+  assert.notEqual(first, second);
+});
+
+test("what poses a recording came with is no truth, and a new run forgets the old one's", async (context) => {
+  const alone = join(work, "poses_alone");
+  cpSync(out, alone, { recursive: true });
+  for (const name of ["map.revisit", "reference.txt"]) rmSync(join(alone, name));
+  const view = await (await fetch(`${await serve(context, alone)}a/view.json`)).json();
+  assert.equal(view.has_truth, false);
+  assert.ok(view.loops.every((loop) => loop.right === undefined));
+  const again = slam("again", { length_m: 60 }), other = slam("again_other", { length_m: 80 });
+  revisit("evaluate", again.out, "--reference", again.drive);
+  revisit("slam", other.drive, "--out", again.out, "--overwrite", "--no-map");
+  const now = await (await fetch(`${await serve(context, again.out)}a/view.json`)).json();
+  assert.equal(now.has_truth, false);
+});
+
+test("many pages that listen leave room for others", async (context) => {
+  const address = await serve(context, out), stop = new AbortController();
+  const listeners = Array.from({ length: 20 }, () => fetch(`${address}events`, { signal: stop.signal }));
+  const answers = await Promise.all(listeners);
+  assert.deepEqual(answers.map((answer) => answer.status).sort(), [...Array(16).fill(200), ...Array(4).fill(503)]);
+  assert.equal((await fetch(`${address}a/view.json`)).status, 200);
+  stop.abort();
+});
+
+test("a report of a broken tileset is an error that names it", () => {
+  const broken = join(work, "broken");
+  cpSync(out, broken, { recursive: true });
+  for (const json of ["[]", "{", '{"root":{"content":"x"}}', '{"root":{"content":{"uri":1}}}']) {
+    writeFileSync(join(broken, "tiles", "tileset.json"), json);
+    assert.throws(() => revisit("view", broken, "--report", join(broken, "r.html")), /error: .*tileset\.json: is no/, json);
+  }
 });
 
 test("a folder without results is an error that says what to name", () => {

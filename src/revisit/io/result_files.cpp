@@ -78,9 +78,9 @@ Result<ResultWriter> ResultWriter::create(const fs::path& folder, Existing exist
   if (const fs::path earlier = folder / "candidates.csv"; existing == Existing::kRefuse && fs::exists(earlier, failure))
     return Error{folder.string() + ": already holds a result; name another folder or pass --overwrite"};
   // What an earlier run left would otherwise stand beside rows that it does not belong to.
-  for (const char* name :
-       {"candidates.csv", "loops.csv", "poses.txt", "poses.tum", "odometry.tum", "graph.g2o", "calib.txt", "run.json",
-        "evaluation.json", "trajectories.png", "map.png", "report.html", "precision_recall.png", "trajectory.png"})
+  for (const char* name : {"candidates.csv", "loops.csv", "poses.txt", "poses.tum", "odometry.tum", "graph.g2o",
+                           "calib.txt", "run.json", "evaluation.json", "reference.txt", "trajectories.png", "map.png",
+                           "report.html", "precision_recall.png", "trajectory.png"})
     if (fs::is_regular_file(fs::symlink_status(folder / name, failure))) fs::remove(folder / name, failure);
   ResultWriter writer(
       std::make_unique<Files>(Files{TextWriter(folder / "candidates.csv"), TextWriter(folder / "loops.csv")}));

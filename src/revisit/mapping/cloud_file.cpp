@@ -103,7 +103,8 @@ void CloudFile::write_las_points(std::span<const Point> points) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Point& p = points[i];
     const std::span<char> row(bytes.data() + i * Las::kPointBytes, Las::kPointBytes);
-    const Eigen::Vector3d position = Eigen::Vector3f(p.x, p.y, p.z).cast<double>();
+    const Eigen::Vector3d position =
+        Las::kScale_m * (Eigen::Vector3f(p.x, p.y, p.z).cast<double>() / Las::kScale_m).array().round();
     const bool is_first = left_ == count_ && i == 0;
     lowest_ = is_first ? position : lowest_.cwiseMin(position);
     highest_ = is_first ? position : highest_.cwiseMax(position);

@@ -75,19 +75,22 @@ class Splitter {
 
 }  // namespace
 
-std::uint64_t Octree::key(const MapPoint& point) const {
-  const double most = static_cast<double>((std::uint64_t{1} << root_bits) - 1);
-  const auto cell = [&](float value, Eigen::Index axis) {
-    return spread(static_cast<std::uint64_t>(
-        std::clamp(std::floor((static_cast<double>(value) - low[axis]) / cell_m), 0.0, most)));
+std::uint64_t Octree::key(const MapPoint& point, std::uint32_t square_x, std::uint32_t square_y) const {
+  const auto cell = [&](float value, Eigen::Index axis, std::uint64_t first, std::uint64_t last) {
+    const double index = std::floor((static_cast<double>(value) - low[axis]) / cell_m);
+    return spread(static_cast<std::uint64_t>(std::clamp(index, static_cast<double>(first), static_cast<double>(last))));
   };
-  return cell(point.x, 0) | cell(point.y, 1) << 1 | cell(point.z, 2) << 2;
+  const std::uint64_t side = std::uint64_t{1} << square_bits, x = square_x * side, y = square_y * side;
+  return cell(point.x, 0, x, x + side - 1) | cell(point.y, 1, y, y + side - 1) << 1 |
+         cell(point.z, 2, 0, (std::uint64_t{1} << root_bits) - 1) << 2;
 }
 
-void split_square(const Octree& octree, std::span<const MapPoint> square,
+void split_square(const Octree& octree, std::uint32_t square_x, std::uint32_t square_y,
+                  std::span<const MapPoint> square,
                   const std::function<void(const OctreeNode&, std::span<const MapPoint>)>& take) {
   std::vector<Sorted> sorted(square.size());
-  for (std::size_t i = 0; i < square.size(); ++i) sorted[i] = {octree.key(square[i]), static_cast<std::uint32_t>(i), 0};
+  for (std::size_t i = 0; i < square.size(); ++i)
+    sorted[i] = {octree.key(square[i], square_x, square_y), static_cast<std::uint32_t>(i), 0};
   std::sort(sorted.begin(), sorted.end(),
             [](const Sorted& a, const Sorted& b) { return a.key != b.key ? a.key < b.key : a.point < b.point; });
   std::vector<Sorted> within;

@@ -213,12 +213,31 @@ TEST(SplitSquare, FewPointsStandInOneNode) {
   std::vector<MapPoint> points(100);
   for (std::size_t i = 0; i < points.size(); ++i) points[i].x = 0.5f * static_cast<float>(i);
   int nodes = 0;
-  split_square(octree, points, [&](const OctreeNode& node, std::span<const MapPoint> own) {
+  split_square(octree, 0, 0, points, [&](const OctreeNode& node, std::span<const MapPoint> own) {
     ++nodes;
     EXPECT_EQ(own.size(), 100u);
     EXPECT_EQ(node.bits, 8);
   });
   EXPECT_EQ(nodes, 1);
+}
+
+// Rounding puts x = 256 m, the border of two squares from -460.8 m on, into another cell than square.
+TEST(BuildMap, PointsOnBordersOfSquaresAreKept) {
+  const fs::path folder = tileset_folder("borders");
+  std::vector<Point> points;
+  for (int i = -9; i <= 20; ++i) points.push_back({static_cast<float>(51.2 * i), 1.f, 0.f, 0.5f});
+  for (const float x : {256.f, 512.f, 768.f}) {
+    points.push_back({x, 20.f, 0.f, 0.5f});
+    points.push_back({x - 1.f, 20.f, 0.f, 0.5f});
+    points.push_back({x + 1.f, 20.f, 0.f, 0.5f});
+  }
+  const MapInput input{{Pose::Identity()}, [&](std::size_t) -> Result<std::vector<Point>> { return points; }, {}};
+  const auto report = build_map(input, {}, folder);
+  ASSERT_TRUE(report) << report.error().message;
+  std::size_t written = 0;
+  for (const auto& entry : fs::directory_iterator(folder / "tiles"))
+    if (entry.path().extension() == ".glb") written += read_glb(entry.path()).size();
+  EXPECT_EQ(written, points.size());
 }
 
 TEST(BuildMap, LabelsPointsWithSessionAndTime) {

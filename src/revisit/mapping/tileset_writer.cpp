@@ -129,12 +129,13 @@ class TilesetWriter::Implementation {
 
   Split split(const Square& square) const {
     Split result;
-    split_square(octree_, square.points, [&](const OctreeNode& node, std::span<const MapPoint> points) {
-      if (node.bits > octree_.square_bits)
-        for (const MapPoint& point : points) result.larger.emplace_back(node, point);
-      else if (result.status)
-        result.status = write(node, points, result.tiles);
-    });
+    split_square(octree_, square.x, square.y, square.points,
+                 [&](const OctreeNode& node, std::span<const MapPoint> points) {
+                   if (node.bits > octree_.square_bits)
+                     for (const MapPoint& point : points) result.larger.emplace_back(node, point);
+                   else if (result.status)
+                     result.status = write(node, points, result.tiles);
+                 });
     return result;
   }
 

@@ -37,13 +37,15 @@ struct Octree {
   Eigen::Vector3d corner(const OctreeNode& node) const {
     return low + edge_m(node.bits) * Eigen::Vector3d(node.x, node.y, node.z);
   }
-  /// 21 bits an axis, interleaved: x lowest. Points below `low` or beyond the octree count as in its outermost cells.
-  std::uint64_t key(const MapPoint& point) const;
+  /// 21 bits an axis, interleaved: x lowest. Points beyond the square, by rounding, or the octree count as in its
+  /// outermost cells.
+  std::uint64_t key(const MapPoint& point, std::uint32_t square_x, std::uint32_t square_y) const;
 };
 
 /// Gives the points of one square of the ground plane to their nodes, in Morton order: `take(node, points)` for each
 /// node that lies in the square, once, with all its points, and, as many times as it has points here, for larger ones.
-void split_square(const Octree& octree, std::span<const MapPoint> square,
+void split_square(const Octree& octree, std::uint32_t square_x, std::uint32_t square_y,
+                  std::span<const MapPoint> square,
                   const std::function<void(const OctreeNode&, std::span<const MapPoint>)>& take);
 
 /// Where a square comes in Morton order.
