@@ -20,7 +20,7 @@ ALLOWED = {
     "odometry": CORE_CONFIG | {"preprocess", "registration"},
     "verification": CORE_CONFIG | {"descriptors", "registration"},
     "pose_graph": {"core"},
-    "store": CORE_CONFIG | {"preprocess", "descriptors", "registration", "odometry", "verification", "pose_graph"},
+    "store": CORE_CONFIG | {"preprocess", "descriptors", "registration", "verification", "pose_graph"},
     "mapping": {"core"},
     "localisation": CORE_CONFIG | {"retrieval", "pose_graph", "store"},
     "pipeline": CORE_CONFIG | {"io", "preprocess", "descriptors", "retrieval", "registration", "odometry",

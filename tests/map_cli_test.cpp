@@ -4,6 +4,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <thread>
 
 #include <fcntl.h>
@@ -49,6 +50,20 @@ struct Maps {
     }
   }
 };
+
+// Of the head of a LAS file: x, y, z; largest x, least x, and so on.
+constexpr std::size_t kLasOffsets = 155, kLasBounds = 179;
+double number_of(const std::string& bytes, std::size_t at, int index) {
+  double value = 0.0;
+  bytes.copy(reinterpret_cast<char*>(&value), sizeof value, at + sizeof value * static_cast<std::size_t>(index));
+  return value;
+}
+
+std::string bytes_of(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
 TEST(MapCli, LocalisesARecordingAndIsScored) {
   const Maps maps;
   const fs::path out = maps.folder / "where";
@@ -106,7 +121,7 @@ TEST(MapCli, GpsPlacesAMapOnTheEarth) {
   std::ofstream(drive) << "[simulation]\nsensor = \"vlp16\"\nlength_m = 60\ngps = true\n";
   ASSERT_EQ(run("simulate --parameters " + drive.string() + " --out " + bag.string()).code, 0);
   EXPECT_NE(run("info " + bag.string()).output.find("/fix"), std::string::npos);
-  const auto made = run("slam " + bag.string() + " --gps --no-map --out " + map.string());
+  const auto made = run("slam " + bag.string() + " --gps --out " + map.string());
   ASSERT_EQ(made.code, 0) << made.output;
   const auto info = run("info --check " + map.string());
   EXPECT_NE(info.output.find("UTM 32N (EPSG:32632)"), std::string::npos) << info.output;
@@ -119,6 +134,16 @@ TEST(MapCli, GpsPlacesAMapOnTheEarth) {
   EXPECT_NEAR(at.x(), 456114.6, 500.0);
   EXPECT_NEAR(at.y(), 5427629.2, 500.0);
   EXPECT_TRUE(fs::exists(out / "utm.json"));
+  // The map of `slam` is where the exported one is, with the same zone and offset in its head.
+  ASSERT_EQ(run("export " + map.string() + " --as las --utm --out " + out.string()).code, 0);
+  const std::string own = bytes_of(map / "map.las"), other = bytes_of(out / "map.las");
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_EQ(number_of(own, kLasOffsets, axis), number_of(other, kLasOffsets, axis));
+    for (const int side : {0, 1})
+      EXPECT_NEAR(number_of(own, kLasBounds, 2 * axis + side), number_of(other, kLasBounds, 2 * axis + side), 0.5);
+  }
+  EXPECT_NEAR(number_of(own, kLasBounds, 0), 456114.6, 500.0);
+  EXPECT_NE(own.find("32632"), std::string::npos);
   // What does not fit together is said.
   const std::string plain = drive_of_day(folder, 0).string();
   const auto without = run("slam " + plain + " --gps --no-map --out " + (folder / "without").string());

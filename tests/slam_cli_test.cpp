@@ -12,6 +12,7 @@
 
 #include <revisit/io/pose_file.hpp>
 #include <revisit/io/scan_file.hpp>
+#include <revisit/store/map_store.hpp>
 
 #include "run_program.hpp"
 #include "shared_data.hpp"
@@ -80,14 +81,15 @@ TEST(SlamCli, GoesOnAfterAKill) {
     const int quiet = ::open("/dev/null", O_WRONLY);
     ::dup2(quiet, 1);
     ::dup2(quiet, 2);
-    ::execl(REVISIT_PROGRAM, REVISIT_PROGRAM, "slam", drive.c_str(), "--out", out.c_str(), nullptr);
+    ::execl(REVISIT_PROGRAM, REVISIT_PROGRAM, "slam", drive.c_str(), "--checkpoint-s", "0", "--out", out.c_str(),
+            nullptr);
     ::_exit(127);
   }
   // As soon as some key frames are there.
   const auto has_some = [&] {
-    std::error_code failure;
-    const auto bytes = fs::file_size(out / "map.revisit-wal", failure);
-    return !failure && bytes > 300'000;
+    const auto store = MapStore::open(out / "map.revisit", MapStore::Access::kRead);
+    const auto keyframes = store ? store->keyframes() : Result<std::vector<StoredKeyframe>>(store.error());
+    return keyframes && keyframes->size() > 2;
   };
   int how = 0;
   while (!has_some() && ::waitpid(child, &how, WNOHANG) == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));

@@ -191,6 +191,8 @@ std::vector<std::string>& program_arguments() {
 void listen_for_interrupt() {
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);
+  // The terminal was closed: what was found is written. Under nohup it goes on.
+  if (std::signal(SIGHUP, on_interrupt) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
 }
 
 bool interrupted() { return interrupt_seen != 0; }

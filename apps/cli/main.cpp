@@ -1,12 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cstdio>
 #include <exception>
+#include <new>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include <oneapi/tbb/global_control.h>
+
+#include <revisit/bits/instruction_sets.hpp>
+
 #include "common.hpp"
 
-int main(int argc, char** argv) {
-  using namespace revisit::cli;
+namespace revisit::cli {
+namespace {
+
+Status use_instruction_set(const std::string& wanted) {
+  std::string known;
+  for (const std::int64_t each : supported_instruction_sets()) {
+    force_instruction_set(each);
+    if (instruction_set_name() == wanted) return ok();
+    known += std::string(" ") + instruction_set_name();
+    force_instruction_set(0);
+  }
+  return Error{"--simd " + wanted + ": this processor has" + known};
+}
+
+int run_program(int argc, char** argv) {
   CLI::App program(
       "revisit recognises places that a LiDAR has seen before, and closes the loop.\n\n"
       "A first run:\n"
@@ -28,6 +48,12 @@ int main(int argc, char** argv) {
       "revisit");
   program.set_version_flag("--version", REVISIT_VERSION);
   program.require_subcommand(1);
+  program.fallthrough();  // these may stand behind the command, too
+  int threads = 0;
+  std::string instruction_set;
+  program.add_option("--threads", threads, "Threads to work on; 0 for all. No result depends on it")
+      ->check(CLI::Range(0, 1024));
+  program.add_option("--simd", instruction_set, "Vector instructions to use instead of the best there are, e.g. AVX2");
   program.get_formatter()->column_width(38);
 
   program_arguments().assign(argv + 1, argv + argc);
@@ -43,11 +69,25 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& problem) {
     return program.exit(problem) == 0 ? kDone : kUsage;
   }
-  try {
-    for (const auto& [command, run] : commands)
-      if (command->parsed()) return run();
-  } catch (const std::exception& problem) {  // our own bug, or no memory
-    return fail({std::string("internal error: ") + problem.what()});
-  }
+  std::optional<tbb::global_control> limit;
+  if (threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+  if (!instruction_set.empty())
+    if (const auto used = use_instruction_set(instruction_set); !used) return fail(used.error(), kUsage);
+  for (const auto& [command, run] : commands)
+    if (command->parsed()) return run();
   return kUsage;
+}
+
+}  // namespace
+}  // namespace revisit::cli
+
+int main(int argc, char** argv) {
+  try {
+    return revisit::cli::run_program(argc, argv);
+  } catch (const std::bad_alloc&) {  // says so without asking for more
+    std::fputs("error: there is not enough memory\n", stderr);
+  } catch (const std::exception& problem) {  // our own bug
+    std::fprintf(stderr, "error: internal error: %s\n", problem.what());
+  }
+  return revisit::cli::kFailed;
 }

@@ -103,6 +103,7 @@ Status detect_all(const Recording& recording, const DetectOne& detect_one, Resul
       if (const Status status = write_loop(writer, *detection); !status) return status;
       if (const Status status = evidence.add(*detection); !status) return status;
     }
+    run.memory.after(i);
     progress.update(i + 1);
   }
   run.interrupted = interrupted();

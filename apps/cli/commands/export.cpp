@@ -11,8 +11,8 @@
 #include <revisit/io/pose_file.hpp>
 #include <revisit/localisation/saved_map.hpp>
 #include <revisit/mapping/build_map.hpp>
-#include <revisit/mapping/earth_frame.hpp>
 #include <revisit/pipeline/map_grid.hpp>
+#include <revisit/pipeline/map_on_earth.hpp>
 #include <revisit/store/keyframe_bytes.hpp>
 
 #include "common.hpp"
@@ -41,28 +41,23 @@ struct Part {
   int epsg = 0;                                        ///< of the UTM zone, where they are in one
 };
 
-// On the grid of a UTM zone. Points are kept as 32-bit numbers, which hold no millions: an offset stands beside them.
+// On the grid of a UTM zone; points have an offset beside them.
 Status put_on_earth(const SavedMap& map, const ExportOptions& options, Part& part) {
-  const auto earth = map.store()->earth();
-  if (!earth) return earth.error();
-  const auto of_part =
-      std::find_if(earth->begin(), earth->end(), [&](const StoredEarth& each) { return each.part == options.part; });
-  if (of_part == earth->end())
+  const auto on_earth = MapOnEarth::of(*map.store(), options.part);
+  if (!on_earth) return on_earth.error();
+  if (!*on_earth)
     return Error{options.map +
                  ": does not know where on the earth it is: it was made without --gps, or with too few "
                  "fixes (see info)"};
-  const EarthFrame frame = EarthFrame(of_part->latitude_deg, of_part->longitude_deg, of_part->altitude_m)
-                               .with_zone_of(of_part->T_earth_map.translation());
+  const EarthFrame& frame = (*on_earth)->frame();
   for (Pose& T : part.poses) {
-    const auto utm = frame.to_utm(of_part->T_earth_map * T);
+    const auto utm = (*on_earth)->to_utm(T);
     if (!utm) return Error{options.map + ": reaches too far out of UTM zone " + frame.utm_zone()};
     T = *utm;
   }
   const bool is_points = options.as != "tum" && options.as != "grid";
   if (is_points) {
-    constexpr double kRound_m = 100.0;
-    part.offset_m = kRound_m * (part.poses.front().translation() / kRound_m).array().floor();
-    part.offset_m.z() = 0.0;
+    part.offset_m = MapOnEarth::round_offset_m(part.poses.front());
     for (Pose& T : part.poses) T.translation() -= part.offset_m;
   }
   const fs::path file = fs::path(options.out) / "utm.json";

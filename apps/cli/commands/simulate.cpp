@@ -13,14 +13,13 @@ namespace {
 
 struct SimulateOptions {
   std::string out;
-  int threads = 0;
   ParameterFlags parameters;
 };
 
 int run_simulation(const SimulateOptions& options) {
   const auto parameters = options.parameters.resolve();
   if (!parameters) return fail(parameters.error(), kUsage);
-  const auto recording = simulate(parameters->simulation, print_log(), options.threads);
+  const auto recording = simulate(parameters->simulation, print_log());
   if (!recording) return fail(recording.error());
 
   listen_for_interrupt();
@@ -36,7 +35,7 @@ int run_simulation(const SimulateOptions& options) {
       const auto converted = convert_recording(**recording, options.out, print_log(), on_scan);
       if (!converted) status = converted.error();
     } else {
-      status = write_recording(**recording, options.out, options.threads, on_scan);
+      status = write_recording(**recording, options.out, 0, on_scan);
     }
   }
   if (!status) return fail(status.error());
@@ -70,9 +69,6 @@ Run add_simulate(CLI::App& program) {
       "         revisit simulate --out drive.mcap --imu true\n"
       "         revisit simulate --out kitti00 --trajectory kitti/poses/00.txt --seed 7");
   command->add_option("--out", options->out, "New or empty folder, or new bag")->required();
-  command->add_option("--threads", options->threads, "Threads to work on; 0 for all. The scans do not depend on it")
-      ->check(CLI::Range(0, 1024))
-      ->capture_default_str();
   options->parameters.add_to(*command, {"simulation"}, ParameterFlags::Names::kShort);
   return [options] { return run_simulation(*options); };
 }

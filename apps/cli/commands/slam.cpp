@@ -33,6 +33,7 @@ struct SlamOptions {
   std::optional<std::string> gps;
   double sweep_s = 0.0;
   bool overwrite = false, resume = false, without_map = false, is_viewed = false;
+  double checkpoint_s = SlamSetup().checkpoint_every_s;
   InputFlags recording;
   ParameterFlags parameters;
 };
@@ -71,6 +72,14 @@ Result<std::vector<GpsFix>> gps_fixes(const SlamOptions& options, const Recordin
                         fixes->back().stamp_s, first_s, last_s) +
                  ": one of the clocks must be set to the other"};
   return fixes;
+}
+
+// Of --into: a session that was killed before its first checkpoint left nothing to go on with.
+Result<bool> begins_session(const MapStore& store, const SlamOptions& options, const std::string& recording) {
+  if (options.into.empty() || !options.resume) return !options.into.empty();
+  const auto sessions = store.sessions();
+  if (!sessions) return sessions.error();
+  return sessions->empty() || sessions->back().recording != recording;
 }
 
 // A session is not continued with another recording.
@@ -167,6 +176,7 @@ Status run_all(Slam& slam, const Recording& recording, const OtherOdometry& odom
       print_log()(LogLevel::kWarning, step.error().message + "; skipped");
       run.skipped.push_back(step.error().message);
     }
+    run.memory.after(i);
     progress.update(i + 1 - first);
   }
   run.interrupted = interrupted();
@@ -278,14 +288,17 @@ int slam(const SlamOptions& options) {
 
   const auto store = open_store(options);
   if (!store) return fail(store.error());
+  const auto is_new = begins_session(**store, options, run.input);
+  if (!is_new) return fail(is_new.error());
   SlamSetup setup{*scale,
                   *calibration,
                   options.odometry.empty() ? Odometry::Source::kLidar : Odometry::Source::kExternal,
                   print_log(),
                   *std::move(gps),
-                  !options.into.empty() && !options.resume,
+                  *is_new,
                   run.input,
-                  parameters_text(*parameters, options)};
+                  parameters_text(*parameters, options),
+                  options.checkpoint_s};
   if (!setup.new_session)
     if (const Status status = check_session(**store, setup.recording, setup.parameters); !status)
       return fail(status.error());
@@ -298,7 +311,7 @@ int slam(const SlamOptions& options) {
   if (!writer) return fail(writer.error());
   if (std::error_code failure; !options.resume && fs::exists(out / "tiles" / "tileset.json", failure))
     fs::remove_all(out / "tiles", failure);  // of another map
-  EvidenceFile evidence(out, options.resume);
+  EvidenceFile evidence(out, slam->last_frame());
   const auto viewer = options.is_viewed ? look_at(options.into.empty() ? out : fs::path(options.into))
                                         : Result<std::unique_ptr<ViewServer>>(nullptr);
   if (!viewer) return fail(viewer.error());
@@ -350,7 +363,7 @@ Run add_slam(CLI::App& program) {
       "(formats: docs/formats.md):\n"
       "  poses.txt/.tum   the corrected trajectory\n"
       "  odometry.tum     the trajectory before any loop\n"
-      "  map.ply/.pcd     the map, without what moved; map.png shows it, tiles/ holds it for viewers (3D Tiles)\n"
+      "  map.ply/.pcd/.las  the map, without what moved; map.png shows it, tiles/ holds it for viewers (3D Tiles)\n"
       "  graph.g2o        the pose graph\n"
       "  loops.csv, candidates.csv, evidence.csv, run.json   as `revisit detect` writes them, for key frames\n"
       "  map.revisit      everything as it is found: an interrupted run continues with --resume (docs/maps.md)\n\n"
@@ -383,7 +396,11 @@ Run add_slam(CLI::App& program) {
                       "Reference poses (KITTI, TUM, g2o), written into the results for `revisit evaluate`; never used "
                       "to track or to find loops");
   command->add_option("--calibration", options->calibration, "Intensity calibration made by `revisit calibrate`");
-  command->add_flag("--resume", options->resume, "Continue the map that is in the folder");
+  command->add_flag("--resume", options->resume,
+                    "Go on with the map in the folder as if the run that made it had not been killed");
+  command->add_option("--checkpoint-s", options->checkpoint_s, "Seconds of work that a kill may cost, about")
+      ->check(CLI::Range(0.0, 3600.0))
+      ->capture_default_str();
   command->add_flag("--overwrite", options->overwrite, "Replace the map that is in the folder");
   command->add_flag("--no-map", options->without_map, "Write the trajectory only");
   command->add_flag("--view", options->is_viewed, "Show the map in a browser while it grows (an address is printed)");

@@ -1,28 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "reports/evidence_file.hpp"
 
+#include <charconv>
+#include <cstdint>
 #include <iomanip>
-#include <iterator>
 #include <system_error>
 
 namespace revisit::cli {
 
 namespace {
 
-// A run that was killed may have left half a row.
-void cut_to_whole_rows(const std::string& file) {
+// A run that was killed wrote rows that the next one will write again, and perhaps half a row.
+void cut_after(const std::string& file, FrameId last) {
   std::ifstream stream(file, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  std::uintmax_t kept = 0;
+  for (std::string line; std::getline(stream, line) && !stream.eof(); kept += line.size() + 1) {
+    std::int64_t query = 0;
+    const bool is_row = std::from_chars(line.data(), line.data() + line.size(), query).ec == std::errc();
+    if (is_row && query > last.value) break;
+  }
+  stream.close();
   std::error_code ignored;
-  if (!text.empty() && !text.ends_with('\n')) std::filesystem::resize_file(file, text.rfind('\n') + 1, ignored);
+  std::filesystem::resize_file(file, kept, ignored);
 }
 
 }  // namespace
 
-EvidenceFile::EvidenceFile(const std::filesystem::path& folder, bool goes_on)
+EvidenceFile::EvidenceFile(const std::filesystem::path& folder, std::optional<FrameId> last)
     : file_((folder / "evidence.csv").string()) {
-  if (goes_on) cut_to_whole_rows(file_);
-  stream_.open(file_, goes_on ? std::ios::app : std::ios::trunc);
+  if (last) cut_after(file_, *last);
+  stream_.open(file_, last ? std::ios::app : std::ios::trunc);
   stream_ << std::setprecision(10);
   if (stream_.tellp() == 0)
     stream_ << "query,match,inlier_ratio,inlier_share,free_space_agreement,intensity_agreement,rmse_m,overlap,"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "reports/run_file.hpp"
 
+#include <cmath>
 #include <fstream>
 
 #include <nlohmann/json.hpp>
@@ -38,6 +39,9 @@ Status write_run(const std::filesystem::path& file, const RunFile& run) {
   const auto found = run.counts.find("scans");
   const double scans = found == run.counts.end() ? 0.0 : static_cast<double>(found->second);
   for (const auto& [stage, ms] : run.ms_total) document["ms_per_scan"][stage] = scans > 0.0 ? ms / scans : 0.0;
+  document["memory_mb"] = nlohmann::ordered_json::array();
+  for (const auto& [scan, mb] : run.memory.samples())
+    document["memory_mb"].push_back({scan, std::round(10.0 * mb) / 10.0});
   document["skipped"] = run.skipped;
   if (run.command == "slam") document["untracked"] = run.untracked;
   return write_text(file, document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");

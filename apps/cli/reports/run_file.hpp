@@ -11,6 +11,8 @@
 #include <revisit/core/result.hpp>
 #include <revisit/preprocess/intensity.hpp>
 
+#include "reports/memory_use.hpp"
+
 namespace revisit::cli {
 
 /// run.json: what was run, on what, and what it cost.
@@ -21,8 +23,9 @@ struct RunFile {
   IntensityScale intensity;
   std::map<std::string, std::size_t> counts;
   std::map<std::string, double> ms_total;  ///< by stage, over all scans
-  std::vector<std::string> skipped;        ///< why each scan was left out
-  std::vector<std::int64_t> untracked;     ///< frames whose pose is predicted only (slam)
+  MemoryUse memory;
+  std::vector<std::string> skipped;     ///< why each scan was left out
+  std::vector<std::int64_t> untracked;  ///< frames whose pose is predicted only (slam)
   bool interrupted = false;
 };
 

@@ -90,6 +90,10 @@ Json read_run_facts(const fs::path& file) {
     for (const auto& [key, value] : run[name].items())
       if (value.is_number()) facts[name][key] = value;
   }
+  if (const auto memory = run.find("memory_mb"); memory != run.end() && memory->is_array())
+    for (const Json& sample : *memory)
+      if (sample.is_array() && sample.size() == 2 && sample[0].is_number() && sample[1].is_number())
+        facts["memory_mb"].push_back(sample);
   if (run.contains("version") && run["version"].is_string()) facts["version"] = run["version"];
   facts["interrupted"] =
       run.contains("interrupted") && run["interrupted"].is_boolean() && run["interrupted"].get<bool>();
@@ -131,6 +135,12 @@ Json loops_of(const ViewData& data, const Reference& reference, const fs::path& 
   const auto evidence = read_evidence(folder / "evidence.csv");
   std::map<std::pair<FrameId, FrameId>, JudgedLoop> judged;
   for (const JudgedLoop& each : evaluate_loops(data.loops, reference).loops) judged[{each.query, each.match}] = each;
+  // The true pose of a query in its match.
+  const auto add_truth = [&data](FrameId query, FrameId match, Json& row) {
+    const auto T_world_query = data.truth.find(query), T_world_match = data.truth.find(match);
+    if (T_world_query == data.truth.end() || T_world_match == data.truth.end()) return;
+    row["true_pose"] = pose_of(T_world_match->second.inverse() * T_world_query->second);
+  };
   Json loops = Json::array();
   for (const LoopConstraint& loop : data.loops) {
     Json row = {{"query", loop.query.value},           {"match", loop.match.value}, {"accepted", true},
@@ -143,6 +153,7 @@ Json loops_of(const ViewData& data, const Reference& reference, const fs::path& 
     }
     if (const auto found = evidence.find({loop.query.value, loop.match.value}); found != evidence.end())
       row["evidence"] = found->second;
+    add_truth(loop.query, loop.match, row);
     loops.push_back(std::move(row));
   }
   for (const CandidateRow& answer : data.answers) {
@@ -160,6 +171,7 @@ Json loops_of(const ViewData& data, const Reference& reference, const fs::path& 
         row["pose"] = {e["tx"], e["ty"], e["tz"], e["qx"], e["qy"], e["qz"], e["qw"]};
       if (e.contains("log_odds")) row["probability"] = 1.0 / (1.0 + std::exp(-e["log_odds"].get<double>()));
     }
+    if (row.contains("pose")) add_truth(answer.query, *answer.match, row);
     loops.push_back(std::move(row));
   }
   return loops;
@@ -209,6 +221,13 @@ Result<ViewData> read_map_view(const fs::path& map_file) {
   data.answers = *answers;
   for (const StoredEdge& edge : *edges)
     if (edge.loop) data.loops.push_back(*edge.loop);
+  const auto earth = map->store()->earth();
+  if (!earth) return earth.error();
+  for (const StoredEarth& each : *earth) {
+    if (keyframes.empty() || each.part != map->part(*keyframes.begin())) continue;
+    const Eigen::Vector3d north = each.T_earth_map.linear().transpose() * Eigen::Vector3d::UnitY();
+    data.north_deg = to_degrees(std::atan2(-north.x(), north.y()));
+  }
   auto truth = read_truth(map_file.parent_path());
   if (!truth) return truth.error();
   data.truth = *std::move(truth);
@@ -257,6 +276,7 @@ Result<std::string> to_view_json(const ViewData& data, const fs::path& folder) {
                {"scans", scans_of(data)},
                {"loops", loops_of(data, reference, folder)},
                {"answers", answers_of(data, reference)}};
+  if (data.north_deg) view["north_deg"] = rounded(*data.north_deg);
   return view.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

@@ -32,6 +32,7 @@ struct ViewData {
   std::vector<LoopConstraint> loops;
   std::map<FrameId, Pose> truth;
   bool has_tiles = false;
+  std::optional<double> north_deg;  ///< of a map made with GPS: from its y axis, counterclockwise
 };
 
 /// Of a map (its folder may hold more), or of what `detect` wrote.

@@ -22,6 +22,10 @@
 namespace revisit::cli {
 namespace {
 
+// With these parameters httplib takes them as they are: what it thinks can be compressed, it compresses with brotli at
+// its highest level, which takes seconds for the view of a large map.
+constexpr const char *kScript = "application/javascript; charset=utf-8", *kJson = "application/json; charset=utf-8";
+
 namespace fs = std::filesystem;
 using httplib::Request;
 using httplib::Response;
@@ -124,23 +128,23 @@ class ViewServer::Implementation {
     server_.set_pre_routing_handler(
         [this](const Request& request, Response& response) { return admit(request, response); });
     serve("/", "text/html; charset=utf-8", page_html());
-    serve("/viewer.js", "text/javascript; charset=utf-8", page_script());
+    serve("/viewer.js", kScript, page_script());
     serve("/viewer.css", "text/css; charset=utf-8", page_style());
     server_.Get("/views.json", [this](const Request&, Response& response) {
-      response.set_content(nlohmann::json({{"views", views_.size()}}).dump(), "application/json");
+      response.set_content(nlohmann::json({{"views", views_.size()}}).dump(), kJson);
     });
     server_.Get(R"(/([ab])/view\.json)", [this](const Request& request, Response& response) {
-      if (auto* view = view_of(request, response)) send(response, view->json(), "application/json");
+      if (auto* view = view_of(request, response)) send(response, view->json(), kJson);
     });
-    server_.Get(
-        R"(/([ab])/tiles/(tileset\.json|\d+_\d+_\d+_\d+\.glb))", [this](const Request& request, Response& response) {
-          auto* view = view_of(request, response);
-          if (view == nullptr) return;
-          const std::string name = request.matches[2];
-          auto bytes = tile(view->tiles(), name);
-          if (!bytes) return refuse(response, 404, name + ": not there");
-          response.set_content(*std::move(bytes), name.ends_with(".glb") ? "model/gltf-binary" : "application/json");
-        });
+    server_.Get(R"(/([ab])/tiles/(tileset\.json|\d+_\d+_\d+_\d+\.glb))",
+                [this](const Request& request, Response& response) {
+                  auto* view = view_of(request, response);
+                  if (view == nullptr) return;
+                  const std::string name = request.matches[2];
+                  auto bytes = tile(view->tiles(), name);
+                  if (!bytes) return refuse(response, 404, name + ": not there");
+                  response.set_content(*std::move(bytes), name.ends_with(".glb") ? "model/gltf-binary" : kJson);
+                });
     server_.Get(R"(/([ab])/scans/(\d{1,18})\.bin)", [this](const Request& request, Response& response) {
       auto* view = view_of(request, response);
       const auto frame = frame_in(request.matches[2]);
@@ -157,7 +161,7 @@ class ViewServer::Implementation {
       if (!descriptor) return refuse(response, 404, descriptor.error().message);
       if (!*descriptor)
         return refuse(response, 404, "the place was known already: its descriptor is that of another key frame");
-      response.set_content(to_json(**descriptor), "application/json");
+      response.set_content(to_json(**descriptor), kJson);
     });
     server_.Get("/events", [this](const Request&, Response& response) { tell_changes(response); });
   }

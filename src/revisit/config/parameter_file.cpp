@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <sstream>
 
-#define TOML_HEADER_ONLY 1  // whoever links this library needs no other
+#define TOML_HEADER_ONLY 1                           // whoever links this library needs no other
+#define TOML_ASSERT(condition) static_cast<void>(0)  // it asserts what a file may hold, and then says as an error
 #include <toml++/toml.h>
 
 namespace revisit {

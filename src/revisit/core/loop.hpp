@@ -31,6 +31,10 @@ struct LoopConstraint {
   /// Inverse covariance of xi where the true pose is T_match_query * small_motion(xi): metres, then radians, in the
   /// query's frame. Small along what the scans do not fix: the length of a corridor.
   Matrix6 information = Matrix6::Identity();
+
+  void archive(auto& fields) {
+    fields(query, match, T_match_query, inlier_ratio, rmse_m, probability, score, information);
+  }
 };
 
 }  // namespace revisit

@@ -17,6 +17,8 @@ namespace revisit {
 /// in the sensor's own unit as read and in [0, 1] after normalisation.
 struct Point {
   float x = 0.f, y = 0.f, z = 0.f, intensity = 0.f;
+
+  void archive(auto& fields) { fields(x, y, z, intensity); }
 };
 static_assert(sizeof(Point) == 16, "the point loops read four floats at a time");
 
@@ -35,6 +37,12 @@ struct Scan {
   std::vector<ImuSample> imu = {};     ///< from before the sweep to its end, increasing times; may be empty
   /// Which way is up, a unit vector in the frame of the points, where something knows it (a mounting, gravity).
   std::optional<Eigen::Vector3f> up = std::nullopt;
+
+  void archive(auto& fields) {
+    fields(frame, stamp_s, points, rings, times_s, dropped_non_finite, dropped_at_origin, imu, up);
+    const auto fits = [&](std::size_t size) { return size == 0 || size == points.size(); };
+    fields.require(fits(rings.size()) && fits(times_s.size()));
+  }
 };
 
 /// Throws std::invalid_argument unless `rings` and `times_s` are empty or hold one entry a point.

@@ -16,6 +16,9 @@ class Stopwatch {
     return lap;
   }
 
+  /// Likewise, and the lap goes on.
+  double elapsed_ms() const { return std::chrono::duration<double, std::milli>(Clock::now() - last_).count(); }
+
  private:
   using Clock = std::chrono::steady_clock;
   Clock::time_point last_ = Clock::now();

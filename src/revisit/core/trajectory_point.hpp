@@ -21,6 +21,8 @@ struct TrajectoryPoint {
   int origin = 0;
   double off_m = 0.0;  ///< what the gaps since the origin may be off, all together
 
+  void archive(auto& fields) { fields(segment, T_segment_lidar, travelled_m, turned_rad, origin, off_m); }
+
   /// The next point of the same segment.
   TrajectoryPoint after(const Pose& T_here_next) const {
     return {segment,

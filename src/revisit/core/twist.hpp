@@ -9,6 +9,8 @@ namespace revisit {
 struct Twist {
   Eigen::Vector3d linear_mps = Eigen::Vector3d::Zero();
   Eigen::Vector3d angular_radps = Eigen::Vector3d::Zero();
+
+  void archive(auto& fields) { fields(linear_mps, angular_radps); }
 };
 
 /// Where the sensor is after `time_s`, seen from where it was: the rotation about the fixed axis, and the translation

@@ -25,6 +25,17 @@ struct IntensityScanContext {
       intensity;  ///< [sector * rings + ring]: largest intensity of the cell, 255 = 1.0; 0 if empty
   std::vector<std::uint64_t> occupancy;  ///< bit sector * rows() + layer * rings + ring, whatever the intensity
 
+  /// Whether there are as many numbers as the grid has cells.
+  bool is_consistent() const {
+    return rings > 0 && sectors > 0 && levels >= 0 &&
+           cells() == static_cast<std::size_t>(rings) * static_cast<std::size_t>(sectors) &&
+           occupancy.size() == (image_cells() + 63) / 64;
+  }
+  void archive(auto& fields) {
+    fields(rings, sectors, levels, intensity, occupancy);
+    fields.require(is_consistent());
+  }
+
   std::size_t cells() const { return intensity.size(); }
   int rows() const { return rings * std::max(1, levels); }  ///< of the image: rings of all layers
   bool occupied(int ring, int sector, int layer = 0) const {

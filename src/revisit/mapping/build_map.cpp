@@ -172,9 +172,14 @@ Result<Extent> thin_squares(const TileFiles& files, double voxel_m) {
   return extent;
 }
 
+Eigen::Vector3d centre_of(const TileIndex& square, double square_m) {
+  return {(square.x + 0.5) * square_m, (square.y + 0.5) * square_m, 0.0};
+}
+
 // The tiles, and the files of the whole map, in one pass over the squares.
 Status write_files(const TileFiles& files, const Extent& extent, const MapOptions& options, const fs::path& folder) {
   constexpr std::size_t kAtOnce = 8;
+  const double square_m = TilesetWriter::square_m(options.voxel_m);
   TilesetWriter tileset(folder / "tiles", extent.bounds);
   std::vector<CloudFile> maps;
   for (const CloudFormat format : options.formats) {
@@ -190,7 +195,10 @@ Status write_files(const TileFiles& files, const Extent& extent, const MapOption
       auto points = files.take(index);
       if (!points) return points.error();
       const std::vector<Point> plain = without_labels(*points);
-      for (CloudFile& map : maps) map.add(plain);
+      for (std::size_t m = 0; m < maps.size(); ++m) {
+        const bool is_moved = options.formats[m] == CloudFormat::kLas && options.T_las_world;
+        maps[m].add(is_moved ? placed(plain, {}, options.T_las_world(centre_of(index, square_m))) : plain);
+      }
       squares.push_back({static_cast<std::uint32_t>(index.x - extent.first.x),
                          static_cast<std::uint32_t>(index.y - extent.first.y), *std::move(points)});
     }

@@ -18,9 +18,11 @@ struct MapOptions {
   double voxel_m = 0.2;     ///< edge of the voxels: one point each
   bool thin_moving = true;  ///< leave out what stood there for a moment only
   /// Of the whole map, one file each: map.ply, map.pcd, map.las.
-  std::vector<CloudFormat> formats = {CloudFormat::kPly, CloudFormat::kPcd};
+  std::vector<CloudFormat> formats = {CloudFormat::kPly, CloudFormat::kPcd, CloudFormat::kLas};
   Eigen::Vector3d las_offset_m = Eigen::Vector3d::Zero();  ///< as for CloudFile
   int las_epsg = 0;                                        ///< likewise
+  /// Where the world near a point of it lies in the coordinates of map.las; absent: those of the world.
+  std::function<Pose(const Eigen::Vector3d& near_m)> T_las_world = {};
 };
 
 struct MapReport {

@@ -20,6 +20,7 @@ class GravityTrack {
   void add(const Scan& scan, double stamp_s, const Pose& T_odom_lidar);
   /// The next scan has nothing to do with those before.
   void restart();
+  void archive(auto& fields) { fields(felt_, intervals_, last_stamp_s_, T_odom_last_); }
   /// Unit vector in the frame of the scan that came last; nothing before four seconds with readings.
   std::optional<Eigen::Vector3f> up() const;
 
@@ -27,11 +28,15 @@ class GravityTrack {
   struct Felt {
     double stamp_s;
     Eigen::Vector3d acceleration;  ///< in the sensor's frame, in any unit
+
+    void archive(auto& fields) { fields(stamp_s, acceleration); }
   };
   // Between two scans.
   struct Interval {
     double middle_s, length_s;
     Eigen::Vector3d felt, velocity_mps;  ///< means, in odometry's frame
+
+    void archive(auto& fields) { fields(middle_s, length_s, felt, velocity_mps); }
   };
   std::optional<Eigen::Vector3d> mean_felt(double stamp_s, const Pose& T_odom_lidar) const;
 

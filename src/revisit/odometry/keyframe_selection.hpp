@@ -21,6 +21,7 @@ class KeyframeSelection {
   /// The newest key frame; `seen` is what was visible from it.
   void set_last(const Pose& T_odom_lidar, SeenSpace seen);
   const Pose& T_odom_last() const { return T_odom_last_; }
+  void archive(auto& fields) { fields(T_odom_last_, seen_from_last_); }
 
  private:
   SlamOptions options_;

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <tsl/robin_map.h>
 #include <Eigen/Eigenvalues>
@@ -31,6 +33,8 @@ struct Planes {
 
 // Sums over points, taken from a place near them so that floats suffice.
 struct Sums {
+  void archive(auto& fields) { fields(origin, first, second, count); }
+
   Eigen::Vector3f origin = Eigen::Vector3f::Zero(), first = Eigen::Vector3f::Zero();
   Eigen::Matrix3f second = Eigen::Matrix3f::Zero();
   std::uint32_t count = 0;
@@ -68,6 +72,8 @@ struct Voxel {
   Sums sums;
   Surface::Patch patch;
   bool is_stale = false;  ///< points were added since the patch was found
+
+  void archive(auto& fields) { fields(sums, patch); }
 };
 
 }  // namespace
@@ -105,6 +111,22 @@ LocalMap::LocalMap(double voxel_m, double reach_m)
 LocalMap::~LocalMap() = default;
 LocalMap::LocalMap(LocalMap&&) noexcept = default;
 LocalMap& LocalMap::operator=(LocalMap&&) noexcept = default;
+
+void LocalMap::archive(StateWriter& fields) {
+  std::vector<std::pair<Index, Voxel>> entries(voxels_->map.begin(), voxels_->map.end());
+  fields(voxel_m_, reach_m_, entries);
+}
+
+void LocalMap::archive(StateReader& fields) {
+  std::vector<std::pair<Index, Voxel>> entries;
+  fields(voxel_m_, reach_m_, entries);
+  fields.require(voxel_m_ > 0.f && reach_m_ > 0.f);
+  *voxels_ = {};
+  for (const auto& [index, voxel] : entries) {
+    fields.require(voxel.sums.count > 0);
+    voxels_->map[index] = voxel;
+  }
+}
 
 std::size_t LocalMap::voxels() const { return voxels_->map.size(); }
 

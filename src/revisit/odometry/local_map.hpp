@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include <revisit/core/state_archive.hpp>
 #include <revisit/registration/surface.hpp>
 
 namespace revisit {
@@ -29,6 +30,9 @@ class LocalMap final : public Surface {
 
   /// The nearest mean among the eight voxels around, if these know a surface there.
   bool nearest_patch(const Eigen::Vector3f& query, float squared_reach_m2, Patch& patch) const override;
+
+  void archive(StateWriter& fields);
+  void archive(StateReader& fields);
 
   std::size_t voxels() const;
   double voxel_m() const { return static_cast<double>(voxel_m_); }

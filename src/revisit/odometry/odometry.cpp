@@ -23,7 +23,8 @@ OdometryStep Odometry::follow(const Scan& scan, const std::optional<Pose>& T_ext
   const bool is_late = !has_last_ || scan.stamp_s > last_stamp_s_;
   const double stamp_s = is_late ? scan.stamp_s : last_stamp_s_ + Following::kTypicalPeriod_s;
   auto T_previous_lidar = motion_by_external(T_external_lidar);
-  const bool is_guess = std::exchange(is_external_restored_, is_external_restored_ && !T_external_lidar);
+  const bool was_restored = std::exchange(is_external_restored_, is_external_restored_ && !T_external_lidar);
+  const bool is_guess = was_restored && !follows(stamp_s);
   if (is_guess && T_previous_lidar &&
       T_previous_lidar->translation().norm() > Following::kFastest_mps * (stamp_s - last_stamp_s_))
     T_previous_lidar.reset();
@@ -131,28 +132,11 @@ std::optional<Pose> Odometry::motion_by_imu(double stamp_s) const {
 // at its stamp.
 void Odometry::begin_map_again(const Twist& motion) {
   matcher_.restart();
-  restore_map(last_stamp_s_, compensated(*first_scan_, motion), T_odom_last_);
-  first_scan_.reset();
-}
-
-void Odometry::restore_map(double stamp_s, std::span<const Point> points, const Pose& T_odom_lidar) {
   ScanMatch match;
-  match.T_odom_lidar = T_odom_lidar;
+  match.T_odom_lidar = T_odom_last_;
   match.is_tracked = true;
-  matcher_.accept(stamp_s, matcher_.thinned(points), match);
-}
-
-void Odometry::restore(double stamp_s, const Pose& T_odom_lidar, const std::optional<Twist>& motion, int segment) {
-  matcher_.restore(stamp_s, T_odom_lidar, motion);
-  has_last_ = true;
-  last_stamp_s_ = stamp_s;
-  T_odom_last_ = T_odom_lidar;
-  segment_ = segment;
-}
-
-void Odometry::restore_external(const Pose& T_external_lidar) {
-  set_external(T_external_lidar);
-  is_external_restored_ = true;
+  matcher_.accept(last_stamp_s_, matcher_.thinned(compensated(*first_scan_, motion)), match);
+  first_scan_.reset();
 }
 
 void Odometry::set_external(const Pose& T_external_lidar) {

@@ -49,15 +49,13 @@ class Odometry {
   /// `T_external_lidar`: the pose from wheels or another odometry, in any frame of its own; it may slip and drift.
   OdometryStep follow(const Scan& scan, const std::optional<Pose>& T_external_lidar = std::nullopt);
 
-  /// A scan of an earlier run enters the map of what was seen lately: its points in its own frame, and its pose.
-  void restore_map(double stamp_s, std::span<const Point> points, const Pose& T_odom_lidar);
-  /// The last scan of an earlier run, and the motion since the one before, if it is known.
-  void restore(double stamp_s, const Pose& T_odom_lidar, const std::optional<Twist>& motion, int segment);
+  void archive(auto& fields) {
+    fields(matcher_, imu_, gravity_, has_last_, last_stamp_s_, T_odom_last_, T_external_last_, T_odom_at_external_,
+           first_scan_, untracked_, segment_);
+    if (fields.kReads) is_external_restored_ = true;
+  }
   /// Segments count from here, before the first scan.
   void begin_at_segment(int segment) { segment_ = segment; }
-  /// What the external odometry said at that last scan. It may have begun anew since: what it says of the time between
-  /// is a first guess, and none where nothing could have moved so far.
-  void restore_external(const Pose& T_external_lidar);
 
  private:
   OdometryStep match(const Scan& scan, double stamp_s, const std::optional<Pose>& T_previous_lidar, bool is_guess);
@@ -77,7 +75,9 @@ class Odometry {
   bool has_last_ = false;
   double last_stamp_s_ = 0.0;
   Pose T_odom_last_ = Pose::Identity();
-  bool is_external_restored_ = false;           ///< until the next scan that comes with one
+  /// Until the next scan that comes with one. Wheels go on counting while nobody listens, or begin anew: after a gap,
+  /// what they say of it is a first guess, and none where nothing could have moved so far.
+  bool is_external_restored_ = false;
   std::optional<Pose> T_external_last_;         ///< of the last scan that came with one
   Pose T_odom_at_external_ = Pose::Identity();  ///< ours at that scan
   std::optional<Scan> first_scan_;              ///< of a segment, as it was swept, until the motion is known

@@ -105,6 +105,8 @@ ScanMatcher::~ScanMatcher() = default;
 ScanMatcher::ScanMatcher(ScanMatcher&&) noexcept = default;
 ScanMatcher& ScanMatcher::operator=(ScanMatcher&&) noexcept = default;
 
+void ScanMatcher::wait() const { insertion_->wait(); }
+
 std::optional<Twist> ScanMatcher::predicted_motion(double stamp_s) const {
   const double gap_s = stamp_s - last_stamp_s_;
   return gap_s > 0.0 && gap_s <= Matching::kLongestGap_s ? motion_ : std::nullopt;
@@ -165,7 +167,7 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
     match.is_tracked = true;  // the map begins wherever it is
     return match;
   }
-  insertion_->wait();
+  wait();
   const auto align_points = [&](std::span<const Eigen::Vector3f> points, double width_m, const Pose& T_guess) {
     IcpResult icp = align_icp(*map_, points, T_odom_lidar_ * T_guess,
                               {.coarse_m = width_m,
@@ -247,7 +249,7 @@ void ScanMatcher::accept(double stamp_s, const MatcherScan& scan, const ScanMatc
   const Eigen::Vector3f here = T_odom_lidar_.translation().cast<float>();
   const bool forgets = (here - forgotten_from_).norm() > Matching::kForgetEvery_m;
   if (forgets) forgotten_from_ = here;
-  insertion_->wait();
+  wait();
   insertion_->run(
       [map = map_.get(), forgets, here,
        points = match.is_tracked ? in_map(scan.map_points, T_odom_lidar_) : std::vector<Eigen::Vector3f>()] {
@@ -264,21 +266,11 @@ void ScanMatcher::accept(double stamp_s, const MatcherScan& scan, const ScanMatc
 }
 
 void ScanMatcher::restart() {
-  insertion_->wait();
+  wait();
   map_.reset();
   motion_.reset();
   squared_prediction_error_m2_ = typical_match_ = 0.0;
   scans_ = 0;
-}
-
-void ScanMatcher::restore(double stamp_s, const Pose& T_odom_lidar, const std::optional<Twist>& motion) {
-  last_stamp_s_ = tracked_stamp_s_ = stamp_s;
-  T_odom_lidar_ = T_odom_tracked_ = T_odom_lidar;
-  untracked_m_ = 0.0;
-  motion_ = motion;
-  // How well scans typically match is to be learnt again.
-  squared_prediction_error_m2_ = typical_match_ = 0.0;
-  scans_ = 1;
 }
 
 }  // namespace revisit

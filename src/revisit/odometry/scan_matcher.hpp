@@ -66,13 +66,22 @@ class ScanMatcher {
 
   /// Forgets what was seen: the next scan begins a map where it is predicted to be.
   void restart();
-  /// Goes on from this pose, with the motion since the scan before, if it is known.
-  void restore(double stamp_s, const Pose& T_odom_lidar, const std::optional<Twist>& motion);
+  void archive(auto& fields) {
+    wait();
+    bool has_map = map_ != nullptr;
+    fields(has_map);
+    if (!has_map) map_.reset();
+    if (has_map && !map_) map_ = std::make_unique<LocalMap>(1.0, 1.0);  // of whatever size the archive says
+    if (has_map) fields(*map_);
+    fields(T_odom_lidar_, motion_, forgotten_from_, last_stamp_s_, range_m_, untracked_m_, T_odom_tracked_,
+           tracked_stamp_s_, squared_prediction_error_m2_, typical_match_, scans_);
+  }
 
   bool has_map() const { return map_ != nullptr; }
 
  private:
   class Insertion;
+  void wait() const;
   ScanMatch match_within(double radius_m, double stamp_s, const MatcherScan& scan, const Pose& T_predicted,
                          std::optional<double> measured_m) const;
   double fine_m() const;

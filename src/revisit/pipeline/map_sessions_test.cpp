@@ -100,6 +100,7 @@ TEST(MapSessions, AnInterruptedSessionGoesOn) {
     ASSERT_TRUE(slam);
     Scan scan = SyntheticWorld(61).scan(back(0), kSixteenLines, 1);
     ASSERT_TRUE(slam->process(std::move(scan)));
+    ASSERT_TRUE(slam->checkpoint());
   }
   SlamSetup setup;
   setup.scale.emplace().full_scale = 1.0;

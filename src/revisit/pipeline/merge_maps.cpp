@@ -174,7 +174,10 @@ Status Merger::add_scans(const Source& source) {
 }
 
 Result<MergeReport> Merger::finish() {
-  if (const Status finished = back_end_.finish(); !finished) return finished.error();
+  Status finished = back_end_.decide_all();
+  if (finished) finished = back_end_.settle();
+  if (finished) finished = store_->commit();
+  if (!finished) return finished.error();
   const KeyframeGraph& graph = back_end_.graph();
   for (const FrameId frame : graph.keyframes())
     report_.sessions.at(static_cast<std::size_t>(session_of(frame))).parts.insert(graph.part(frame));
@@ -205,9 +208,11 @@ Result<MergeReport> merge_maps(std::span<const fs::path> maps, const fs::path& o
   }
   // Complete, it gets its name; whatever ends the work before leaves no map behind.
   const fs::path partial = out.string() + ".part";
-  const auto remove_partial = [&] {
-    for (const char* ending : {"", "-wal", "-shm"}) fs::remove(partial.string() + ending, failure);
+  const auto remove_partial = [](const fs::path* file) {
+    std::error_code ignored;
+    for (const char* ending : {"", "-wal", "-shm", "-journal"}) fs::remove(file->string() + ending, ignored);
   };
+  const std::unique_ptr<const fs::path, decltype(remove_partial)> at_the_end(&partial, remove_partial);
   if (const Status removed = MapStore::remove_file(partial); !removed) return removed.error();
   auto store = MapStore::create(partial);
   if (!store) return store.error();
@@ -224,7 +229,6 @@ Result<MergeReport> merge_maps(std::span<const fs::path> maps, const fs::path& o
     if (const Status closed = written->close(); !closed) report = closed.error();
   if (report) fs::rename(partial, out, failure);
   if (report && failure) report = Error{out.string() + ": cannot be written: " + failure.message()};
-  if (!report) remove_partial();
   return report;
 }
 

@@ -59,6 +59,16 @@ class PlaceRecognition {
   using Retrieval = std::function<std::vector<FrameId>(const PreparedScan& query, std::size_t places)>;
   void set_retrieval(Retrieval retrieval) { retrieval_ = std::move(retrieval); }
 
+  /// All but the index, whose places were restored, and the clouds.
+  void archive(auto& fields) {
+    fields(points_, following_, look_alikes_, look_alikes_of_map_, queries_, recent_queries_);
+    for (std::size_t i = 0; i < index_.size(); ++i) fields.require(points_.contains(index_.frame(i)));
+    for (const RecentQuery& each : recent_queries_)
+      fields.require(each.descriptor.rings == parameters_.descriptor.rings &&
+                     each.descriptor.sectors == parameters_.descriptor.sectors &&
+                     each.descriptor.levels == parameters_.descriptor.levels);
+  }
+
   const PlaceIndex& index() const { return index_; }
   /// How much alike the places are (LookAlikes): as this run learnt, or as the map says.
   double look_alikes_log_odds() const { return look_alikes_of_map_ ? *look_alikes_of_map_ : look_alikes_.log_odds(); }
@@ -84,6 +94,8 @@ class PlaceRecognition {
   struct RecentQuery {
     FrameId frame;
     IntensityScanContext descriptor;
+
+    void archive(auto& fields) { fields(frame, descriptor); }
   };
   std::deque<RecentQuery> recent_queries_;  ///< the last N, for temporal consistency
 };

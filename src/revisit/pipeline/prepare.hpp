@@ -53,6 +53,7 @@ class ScanPreparation {
 
   const IntensityScale& intensity_scale() const { return scale_.scale(); }
   void set_intensity_scale(const IntensityScale& scale) { scale_.set(scale); }
+  void archive(auto& fields) { fields(scale_, has_reported_rings_, reported_warning_); }
 
  private:
   void report(const GroundSegmentation& ground);

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/pipeline/slam.hpp>
 
-#include <sstream>
+#include <algorithm>
 #include <utility>
 
-#include <revisit/core/stopwatch.hpp>
+#include <revisit/core/state_archive.hpp>
 #include <revisit/core/text.hpp>
 #include <revisit/pipeline/known_ground.hpp>
+#include <revisit/pipeline/map_on_earth.hpp>
 #include <revisit/store/keyframe_bytes.hpp>
 
 namespace revisit {
@@ -17,7 +18,14 @@ Result<std::shared_ptr<MapStore>> shared(Result<MapStore> store) {
   return std::make_shared<MapStore>(*std::move(store));
 }
 
-constexpr const char* kExternalNote = "external_odometry";
+constexpr double kCheckpointShare = 0.05;  // of the time, at most
+
+bool is_of_this_version(const Bytes& state) {
+  std::string version;
+  StateReader reader(state);
+  reader(version);
+  return version == REVISIT_VERSION;
+}
 
 }  // namespace
 
@@ -29,7 +37,8 @@ Slam::Slam(const Parameters& parameters, const SlamSetup& setup, Result<std::sha
       store_(store ? *store : nullptr),
       failure_(store ? ok() : Status(store.error())),
       front_end_(parameters, setup.odometry, setup.scale, setup.calibration, setup.log),
-      back_end_(parameters, setup.odometry, store_, setup.log) {
+      back_end_(parameters, setup.odometry, store_, setup.log),
+      checkpoint_every_s_(setup.checkpoint_every_s) {
   back_end_.set_gps(setup.gps);
 }
 
@@ -67,46 +76,53 @@ Status Slam::restore(const SlamSetup& setup) {
   session_ = session.id;
   if (!continues)
     if (const Status status = store_->set(session); !status) return status;
+  if (continues) {
+    const auto state = store_->state();
+    if (!state) return state.error();
+    if (is_of_this_version(*state)) return go_on(*map, session, *state, setup);
+  }
   if (const Status status = back_end_.restore(*map, session); !status) return status;
   if (*removed)
     if (const Status status = back_end_.renumber_parts(*map); !status) return status;
   if (map->keyframes.empty()) return ok();
-  if (session_of(map->keyframes.back().frame.frame) != session_) {
-    front_end_.begin_session(map->keyframes.back().point.segment + 1);
-    return ok();
+  const StoredMap::Keyframe& last = map->keyframes.back();
+  const bool is_same = session_of(last.frame.frame) == session_;
+  if (is_same) {
+    last_frame_ = in_recording(last.frame.frame);
+    log_to(setup.log, LogLevel::kWarning,
+           store_->file() +
+               ": another version of the program made it, whose memory is gone: a new segment of the "
+               "trajectory begins, until its place in the map is found");
   }
-  const auto last = store_->last_scans(1);
-  if (!last) return last.error();
-  if (!last->empty()) last_frame_ = in_recording(last->back().frame);
-  if (Status restored = front_end_.restore(*store_, *map); !restored) return restored;
-  return restore_external();
-}
-
-// Wheels go on counting while nobody listens: a run that goes on knows by them how far the robot went meanwhile.
-Status Slam::note_external() {
-  if (!T_external_last_) return ok();
-  const Eigen::Vector3d& p = T_external_last_->translation();
-  const Eigen::Quaterniond q(T_external_last_->linear());
-  return store_->set_note(kExternalNote, format("%lld %.17g %.17g %.17g %.17g %.17g %.17g %.17g",
-                                                static_cast<long long>(in_map(session_, *last_frame_).value), p.x(),
-                                                p.y(), p.z(), q.x(), q.y(), q.z(), q.w()));
-}
-
-Status Slam::restore_external() {
-  const auto note = store_->note(kExternalNote);
-  if (!note) return note.error();
-  if (!*note || !last_frame_) return ok();
-  std::istringstream text(**note);
-  long long frame = 0;
-  Eigen::Vector3d p;
-  Eigen::Quaterniond q;
-  text >> frame >> p.x() >> p.y() >> p.z() >> q.x() >> q.y() >> q.z() >> q.w();
-  if (!text || FrameId{frame} != in_map(session_, *last_frame_)) return ok();
-  Pose T = Pose::Identity();
-  T.translation() = p;
-  T.linear() = q.normalized().toRotationMatrix();
-  if (T.matrix().allFinite()) front_end_.restore_external(T);
+  const auto sensor = to_sensor_facts(session.sensor);
+  if (!sensor) return sensor.error();
+  front_end_.begin_at_segment(last.point.segment + 1, is_same ? *sensor : std::nullopt);
   return ok();
+}
+
+// Nothing of the run before is lost but what it logged.
+Status Slam::go_on(const StoredMap& map, const StoredSession& session, const Bytes& state, const SlamSetup& setup) {
+  StateReader reader(state);
+  std::string version;
+  reader(version, last_frame_, is_finished_, front_end_);
+  if (const Status status = back_end_.restore(map, session, &reader); !status) return status;
+  if (!setup.gps.empty()) back_end_.set_gps(setup.gps);
+  if (reader.is_complete()) return ok();
+  return Error{store_->file() + ": the state of its run does not fit the map: restore the file from a copy"};
+}
+
+// The state and all rows that belong to it, at once.
+Status Slam::checkpoint() {
+  if (!failure_ || !has_keyframes()) return failure_;
+  Stopwatch watch;
+  StateWriter writer;
+  std::string version = REVISIT_VERSION;
+  writer(version, last_frame_, is_finished_, front_end_, back_end_);
+  failure_ = store_->set_state(writer.take());
+  if (failure_) failure_ = store_->commit();
+  if (checkpoint_every_s_ > 0.0) pause_s_ = std::max(checkpoint_every_s_, watch.lap_ms() / 1e3 / kCheckpointShare);
+  since_checkpoint_.lap_ms();
+  return failure_;
 }
 
 bool Slam::has_keyframes() const {
@@ -121,6 +137,9 @@ Result<SlamStep> Slam::process(Scan scan, const std::optional<Pose>& T_external_
     return Error{to_text(scan.frame) + ": not after " + to_text(*last_frame_) + ", the last one of the map"};
   if (!fits_into_map(scan.frame))
     return Error{"frame " + std::to_string(scan.frame.value) + ": a map numbers frames from 0 to 2^40 - 1"};
+  // Before the scan: by now the caller has dealt with what earlier calls returned.
+  if (since_checkpoint_.elapsed_ms() >= 1e3 * pause_s_)
+    if (const Status saved = checkpoint(); !saved) return saved.error();
   SlamStep step;
   step.frame = scan.frame;
   scan.frame = in_map(session_, scan.frame);
@@ -156,26 +175,28 @@ Result<SlamStep> Slam::process(Scan scan, const std::optional<Pose>& T_external_
   step.T_world_lidar = graph().T_world_lidar(keyframe) * T_keyframe_lidar;
   failure_ = store_->add(StoredScan{in_map(session_, step.frame), keyframe, odometry.stamp_s, T_keyframe_lidar,
                                     odometry.T_odom_lidar, step.is_tracked});
-  T_external_last_ = T_external_lidar;
-  if (failure_ && step.is_keyframe) failure_ = note_external();
-  if (failure_ && step.is_keyframe) failure_ = store_->commit();
   if (!failure_) return failure_.error();
+  is_finished_ = false;
   step.ms.store += watch.lap_ms();
   return step;
 }
 
 Status Slam::add(const GpsFix& fix) {
   if (!failure_) return failure_;
-  if (const Status added = back_end_.add_gps(fix); !added) failure_ = added;
+  is_finished_ = false;
+  failure_ = back_end_.add_gps(fix);
   return failure_;
 }
 
 Status Slam::finish() {
   if (!failure_) return failure_;
   if (!has_keyframes()) return store_->roll_back();  // an empty session is none
-  const Status noted = note_external();
-  const Status finished = back_end_.finish();
-  return finished ? noted : finished;
+  if (is_finished_) return ok();
+  failure_ = back_end_.decide_all();
+  if (const Status saved = checkpoint(); !saved) return saved;
+  if (const Status settled = back_end_.settle(); !settled) return settled;
+  is_finished_ = true;
+  return checkpoint();
 }
 
 Result<Slam::Trajectories> Slam::trajectories() const {
@@ -214,7 +235,11 @@ Result<std::vector<Point>> Slam::map(const std::function<bool(std::size_t)>& pro
 
 Result<MapReport> Slam::write_map(const std::filesystem::path& folder,
                                   const std::function<bool(std::size_t)>& progress) const {
-  return build_map(map_input(), {.voxel_m = parameters_.slam.map_voxel_m}, folder, progress);
+  MapOptions options{.voxel_m = parameters_.slam.map_voxel_m};
+  const auto on_earth = MapOnEarth::of(*store_, graph().part(graph().keyframes().back()));
+  if (!on_earth) return on_earth.error();
+  if (*on_earth) (*on_earth)->place_las(options);
+  return build_map(map_input(), options, folder, progress);
 }
 
 }  // namespace revisit

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include <revisit/core/stopwatch.hpp>
 #include <revisit/mapping/build_map.hpp>
 #include <revisit/pipeline/slam_back_end.hpp>
 #include <revisit/pipeline/slam_front_end.hpp>
@@ -38,10 +39,14 @@ struct SlamSetup {
   bool new_session = false;      ///< another recording enters the map that is there; else its last one goes on
   std::string recording = {};    ///< of a new session, as the map shall name it
   std::string parameters = {};   ///< likewise: what must not change while it is made
+  /// How much work a kill may cost: what was found, and what is in memory, is committed so often, or as often as that
+  /// takes a twentieth of the time; 0: before every scan.
+  double checkpoint_every_s = 2.0;
 };
 
 /// Scans in; trajectory, loops and map out, online. Takes scans as a driver delivers them. Everything is kept in a
-/// store: a temporary one, or a folder, from which an interrupted run continues. In memory are the surroundings, the
+/// store: a temporary one, or a folder, from which a run that was killed goes on as if it had not been: the same scans
+/// give the same map. In memory are the surroundings, the
 /// index and the graph. Frames increase. Belongs to one thread at a time.
 class Slam {
  public:
@@ -61,6 +66,8 @@ class Slam {
   Status add(const GpsFix& fix);
   /// Decides about loops that wait for others, and settles the graph. More scans may follow.
   Status finish();
+  /// A kill from here on costs nothing of what was processed so far.
+  Status checkpoint();
   /// Takes over `temporal` and `geometric`, from the next scan on. Throws std::invalid_argument for parameters out of
   /// range.
   void set_verification(const Parameters& parameters) { back_end_.set_verification(require_valid(parameters)); }
@@ -92,8 +99,7 @@ class Slam {
  private:
   Slam(const Parameters& parameters, const SlamSetup& setup, Result<std::shared_ptr<MapStore>> store);
   Status restore(const SlamSetup& setup);
-  Status note_external();
-  Status restore_external();
+  Status go_on(const StoredMap& map, const StoredSession& session, const Bytes& state, const SlamSetup& setup);
   MapInput map_input() const;
 
   Parameters parameters_;
@@ -102,8 +108,10 @@ class Slam {
   SlamFrontEnd front_end_;
   SlamBackEnd back_end_;
   std::optional<FrameId> last_frame_;
-  std::optional<Pose> T_external_last_;  ///< what the other odometry said at that scan
   int session_ = 0;
+  bool is_finished_ = false;                   ///< and nothing came since
+  double checkpoint_every_s_, pause_s_ = 0.0;  ///< between checkpoints: as set, and in fact
+  Stopwatch since_checkpoint_;
 };
 
 }  // namespace revisit

@@ -201,8 +201,7 @@ Status SlamBackEnd::enter(const std::vector<LoopGate::Decision>& decisions, std:
 
 // Places of earlier sessions then lie to each other as the map has them.
 Status SlamBackEnd::settle_session() {
-  std::size_t entered = 0;
-  if (Status stored = enter(graph_.decide_all(), entered); !stored) return stored;
+  if (Status stored = decide_all(); !stored) return stored;
   if (Status settled = graph_.settle(); !settled) return settled;
   if (Status compared = compare_with_visits(*store_, graph_, session_.id); !compared) return compared;
   for (const StoredMapPose& each : poses_of_places())
@@ -210,17 +209,19 @@ Status SlamBackEnd::settle_session() {
   return ok();
 }
 
-Status SlamBackEnd::finish() {
+Status SlamBackEnd::decide_all() {
   std::size_t entered = 0;
-  const Status stored = enter(graph_.decide_all(), entered);
-  const Status settled = settle_map(*store_, graph_, log_);
-  const Status placed = stored && settled ? write_map_poses() : ok();
-  const Status compared = stored && settled ? compare_with_visits(*store_, graph_, session_.id) : ok();
-  const Status learnt = stored && settled ? learn_look_alikes() : ok();
-  const Status committed = store_->commit();
-  for (const Status* each : {&stored, &settled, &placed, &compared, &learnt})
-    if (!*each) return *each;
-  return committed;
+  return enter(graph_.decide_all(), entered);
+}
+
+// All or nothing: half an index would be a damaged map.
+Status SlamBackEnd::settle() {
+  Status done = settle_map(*store_, graph_, log_);
+  if (done) done = write_map_poses();
+  if (done) done = compare_with_visits(*store_, graph_, session_.id);
+  if (done) done = learn_look_alikes();
+  if (!done) (void)store_->roll_back();
+  return done;
 }
 
 Status SlamBackEnd::add_gps(const GpsFix& fix) {
@@ -332,21 +333,31 @@ FrameTime SlamBackEnd::time_in_index(const FrameTime& frame) {
   return {frame.frame, frame.stamp_s + stamp_shift_s_};
 }
 
-Status SlamBackEnd::restore(const StoredMap& map, const StoredSession& session) {
+Status SlamBackEnd::restore(const StoredMap& map, const StoredSession& session, StateReader* state) {
   session_ = session;
   const auto facts = to_sensor_facts(session.sensor);
   if (!facts) return facts.error();
   if (*facts) facts_ = **facts;
   if (map.keyframes.empty()) return ok();
-  if (const Status status = restore_graph(map, graph_); !status) return status;
-  return restore_places(*store_, map, parameters_.descriptor,
-                        [this](const StoredMap::Keyframe& each, const IntensityScanContext& descriptor) {
-                          const FrameId frame = each.frame.frame;
-                          const bool is_earlier = session_of(frame) != session_.id;
-                          recognition_.restore(
-                              time_in_index(each.frame), descriptor,
-                              is_earlier ? point_in_map(graph_.T_world_lidar(frame), graph_.part(frame)) : each.point);
-                        });
+  if (!state)
+    if (const Status status = restore_graph(map, graph_); !status) return status;
+  const auto own = std::find_if(map.keyframes.begin(), map.keyframes.end(),
+                                [&](const auto& each) { return session_of(each.frame.frame) == session_.id; });
+  const auto restore_place = [&](const StoredMap::Keyframe& each, const IntensityScanContext& descriptor) {
+    const FrameId frame = each.frame.frame;
+    const bool is_earlier = session_of(frame) != session_.id;
+    if (!is_earlier) (void)time_in_index(own->frame);  // a session begins with its first key frame, place or not
+    const bool is_in_map = is_earlier && !state;
+    recognition_.restore(time_in_index(each.frame), descriptor,
+                         is_in_map ? point_in_map(graph_.T_world_lidar(frame), graph_.part(frame)) : each.point);
+  };
+  if (Status places = restore_places(*store_, map, parameters_.descriptor, restore_place); !places) return places;
+  if (!state) return ok();
+  archive(*state);
+  const auto& keyframes = graph_.keyframes();
+  state->require(std::equal(keyframes.begin(), keyframes.end(), map.keyframes.begin(), map.keyframes.end(),
+                            [](FrameId frame, const auto& row) { return frame == row.frame.frame; }));
+  return ok();
 }
 
 }  // namespace revisit

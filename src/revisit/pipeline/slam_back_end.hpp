@@ -47,10 +47,17 @@ class SlamBackEnd {
   Status add_known_loop(const LoopConstraint& loop);
   /// What follows belongs to this session: after the first, decides about all loops that wait.
   Status begin_session(const StoredSession& session);
-  /// Decides about loops that wait for others, and settles the graph.
-  Status finish();
-  /// The map of before; `session` is the one that this run adds or continues.
-  Status restore(const StoredMap& map, const StoredSession& session);
+  /// Decides about loops that wait for others: no more will come.
+  Status decide_all();
+  /// Settles the graph, and makes the map ready to be opened. All of it is stored, or none.
+  Status settle();
+  /// The map of before; `session` is the one that this run adds or continues. `state`: what archive() wrote of the run
+  /// that goes on.
+  Status restore(const StoredMap& map, const StoredSession& session, StateReader* state = nullptr);
+  void archive(auto& fields) {
+    fields(gps_, without_fix_, last_fix_at_m_, last_up_s_, session_.sensor, facts_, graph_, recognition_,
+           newest_session_, stamp_shift_s_, newest_stamp_s_);
+  }
 
   /// Parts are counted by their segments: once some have gone, what the map says of its parts is written anew.
   Status renumber_parts(const StoredMap& map);

@@ -43,7 +43,7 @@ Result<SlamFrontEnd::Step> SlamFrontEnd::step(Scan scan, const std::optional<Pos
                             selection_.is_keyframe(odometry.T_odom_lidar,
                                                    odometry.compensated.empty() ? scan.points : odometry.compensated));
   if (!is_keyframe && !makes_a_pair(odometry)) {
-    previous_.reset();
+    set_previous(nullptr);
     return step;
   }
   scan.stamp_s = odometry.stamp_s;
@@ -52,12 +52,17 @@ Result<SlamFrontEnd::Step> SlamFrontEnd::step(Scan scan, const std::optional<Pos
   step.prepare_ms = watch.lap_ms();
   if (!prepared && !keyframe_segment_) return prepared.error();
   if (!prepared || !is_keyframe) {
-    previous_.reset();
+    set_previous(nullptr);
     return step;
   }
-  previous_ = prepared->geometry;
+  set_previous(&*prepared);
   step.keyframe = *std::move(prepared);
   return step;
+}
+
+void SlamFrontEnd::set_previous(const PreparedScan* scan) {
+  previous_ = scan ? scan->geometry : nullptr;
+  previous_cloud_ = previous_ ? std::optional(scan->cloud) : std::nullopt;
 }
 
 // Until the typical agreement is known, the scan after each key frame is looked at, too.
@@ -88,15 +93,11 @@ void SlamFrontEnd::report(FrameId frame, const OdometryStep& odometry) const {
                ": tracking is lost; a new segment of the trajectory begins, until its place in the map is found");
 }
 
-Status SlamFrontEnd::restore(const MapStore& store, const StoredMap& map) {
-  const auto sensor = to_sensor_facts(map.sessions.back().sensor);
-  if (!sensor) return sensor.error();
-  if (*sensor) {
-    typical_.restore((*sensor)->typical, (*sensor)->typical_pairs);
-    preparation_.set_intensity_scale((*sensor)->intensity_scale);
-  }
-  keyframe_segment_ = map.keyframes.back().point.segment;
-  return restore_odometry(store, map, odometry_, selection_);
+void SlamFrontEnd::begin_at_segment(int segment, const std::optional<SensorFacts>& sensor) {
+  odometry_.begin_at_segment(segment);
+  if (!sensor) return;
+  typical_.restore(sensor->typical, sensor->typical_pairs);
+  preparation_.set_intensity_scale(sensor->intensity_scale);
 }
 
 }  // namespace revisit

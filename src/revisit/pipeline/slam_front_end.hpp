@@ -37,14 +37,17 @@ class SlamFrontEnd {
     return selection_.T_odom_last().inverse() * odometry.T_odom_lidar;
   }
   SensorFacts sensor() const { return {preparation_.intensity_scale(), typical_.overall(), typical_.pairs(), 0.0}; }
-  /// Goes on where the last session of the map ended.
-  Status restore(const MapStore& store, const StoredMap& map);
-  /// Begins a new session; segments count on from this one.
-  void begin_session(int first_segment) { odometry_.begin_at_segment(first_segment); }
-  void restore_external(const Pose& T_external_lidar) { odometry_.restore_external(T_external_lidar); }
+  /// Begins anew, elsewhere; segments count on from this one. `sensor`: what is known of it, in the session that goes
+  /// on.
+  void begin_at_segment(int segment, const std::optional<SensorFacts>& sensor = std::nullopt);
+  void archive(auto& fields) {
+    fields(odometry_, selection_, preparation_, typical_, keyframe_segment_, previous_cloud_);
+    if (fields.kReads) previous_ = previous_cloud_ ? std::make_shared<ScanGeometry>(*previous_cloud_) : nullptr;
+  }
 
  private:
   Result<PreparedScan> prepare(Scan scan, const OdometryStep& odometry);
+  void set_previous(const PreparedScan* scan);
   bool makes_a_pair(const OdometryStep& odometry) const;
   void report(FrameId frame, const OdometryStep& odometry) const;
 
@@ -54,8 +57,10 @@ class SlamFrontEnd {
   KeyframeSelection selection_;
   ScanPreparation preparation_;
   TypicalAgreementEstimate typical_;
-  std::optional<int> keyframe_segment_;           ///< of the last key frame, if there is one
-  std::shared_ptr<const ScanGeometry> previous_;  ///< the scan before, where it was a key frame and pairs are learnt
+  std::optional<int> keyframe_segment_;  ///< of the last key frame, if there is one
+  // Of the scan before, where it was a key frame and pairs are learnt.
+  std::optional<ThinCloud> previous_cloud_;
+  std::shared_ptr<const ScanGeometry> previous_;
 };
 
 }  // namespace revisit

@@ -53,6 +53,7 @@ struct Drive {
     auto store = is_new ? MapStore::create(file) : MapStore::open(file);
     SlamSetup setup;
     setup.scale = as_it_is();
+    setup.checkpoint_every_s = 0.0;
     setup.log = [this](LogLevel, const std::string& text) { log += text + '\n'; };
     auto started = Slam::open(std::make_shared<MapStore>(*std::move(store)), parameters(), setup);
     if (started) slam.emplace(*std::move(started));
@@ -187,6 +188,71 @@ TEST(Slam, GoesOnWhereAKillLeftIt) {
   EXPECT_GT(drive.loops, 10u) << "with places of before";
   EXPECT_LT(drive.worst_m(0, kScans), 0.2);
   EXPECT_EQ(drive.slam->trajectories()->corrected.entries.size(), std::size_t{kScans});
+}
+
+// Odometry's surroundings, loops that wait, what was learnt: all of it is there again.
+TEST(Slam, GoesOnAsIfItHadNotBeenKilled) {
+  const auto poses_of = [](const Drive& drive) {
+    std::vector<Eigen::Matrix4d> poses;
+    const auto trajectories = drive.slam->trajectories();
+    for (const Trajectory* each : {&trajectories->odometry, &trajectories->corrected})
+      for (const auto& [frame, entry] : each->entries) poses.push_back(entry.T_world_lidar.matrix());
+    return poses;
+  };
+  Drive whole("never_killed");
+  whole.go(0, kScans);
+  ASSERT_TRUE(whole.slam->finish());
+  // Early, in the turn, after the first loops, and once it was finished.
+  std::size_t loops = 0;
+  for (int killed = 0, done = 0; const int at : {1, 7, 60, 101, 115, 118, kScans, kScans}) {
+    Drive drive("often_killed", killed++ == 0);
+    ASSERT_TRUE(drive.slam) << at;
+    if (const auto last = drive.slam->last_frame()) done = static_cast<int>(last->value) + 1;
+    drive.go(done, at);
+    loops += drive.loops;
+    if (at < kScans) continue;
+    ASSERT_TRUE(drive.slam->finish());
+    EXPECT_EQ(poses_of(drive), poses_of(whole)) << at;
+    EXPECT_EQ(drive.slam->store().edges()->size(), whole.slam->store().edges()->size());
+  }
+  EXPECT_GE(loops, whole.loops);
+}
+
+// A map may come from anybody: whatever its state says, it is refused, or a run goes on with it.
+TEST(Slam, AStateThatSomebodyAlteredIsRefusedOrGoesOn) {
+  Bytes state;
+  {
+    Drive drive("altered");
+    drive.go(0, 40);
+    state = *drive.slam->store().state();
+  }
+  ASSERT_GT(state.size(), 10'000u);
+  const auto file = std::filesystem::path(testing::TempDir()) / "revisit_slam_altered.map";
+  int refused = 0;
+  constexpr int kTrials = 40;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    Bytes altered = state;
+    // The first numbers are those of the odometry and its surroundings, the last ones those of the graph.
+    const std::size_t at = trial % 3 == 0   ? 20 + static_cast<std::size_t>(trial) * 7
+                           : trial % 3 == 1 ? state.size() - 1 - static_cast<std::size_t>(trial) * 97
+                                            : state.size() / kTrials * static_cast<std::size_t>(trial);
+    if (trial % 10 == 9)
+      altered.resize(at);
+    else
+      altered[at] = static_cast<std::byte>(trial % 2 == 0 ? 0xff : 0x80) ^ altered[at];
+    ASSERT_TRUE([&] {
+      auto store = MapStore::open(file);
+      return store && store->set_state(altered) && store->commit();
+    }());
+    Drive drive("altered", false);
+    if (!drive.slam) {
+      ++refused;
+      continue;
+    }
+    drive.go(40, 42);
+    (void)drive.slam->checkpoint();
+  }
+  EXPECT_GE(refused, kTrials / 10) << "those that were cut off, for one";
 }
 
 // Killed on its way out, and on its way back when it is started again: wheels say how far it went.

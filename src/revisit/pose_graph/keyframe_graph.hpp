@@ -66,6 +66,15 @@ class KeyframeGraph {
   const TrajectoryPoint& last_point() const { return last_point_; }
   /// While the newest segment is not attached: the last key frame before it.
   std::optional<FrameId> last_attached() const { return last_attached_; }
+  void archive(auto& fields) {
+    fields(graph_, gate_, keyframes_, last_point_, last_attached_, loops_unsettled_, keyframes_unsettled_);
+    node_of_.clear();
+    for (std::size_t node = 0; node < keyframes_.size(); ++node) node_of_[keyframes_[node]] = node;
+    fields.require(keyframes_.size() == graph_.nodes().size() && node_of_.size() == keyframes_.size() &&
+                   gate_.keyframes() == keyframes_.size());
+    for (const FrameId frame : keyframes_) fields.require(gate_.has(frame));
+    fields.require(!last_attached_ || has(*last_attached_));
+  }
 
  private:
   Status optimise(double settled);

@@ -32,6 +32,11 @@ void LoopGate::add_keyframe(FrameId frame, const TrajectoryPoint& point) {
   keyframes_.push_back({frame, point});
 }
 
+bool LoopGate::has(FrameId frame) const {
+  return std::binary_search(keyframes_.begin(), keyframes_.end(), Keyframe{frame, {}},
+                            [](const Keyframe& a, const Keyframe& b) { return a.frame < b.frame; });
+}
+
 const TrajectoryPoint& LoopGate::at(FrameId frame) const {
   const auto found = std::lower_bound(keyframes_.begin(), keyframes_.end(), frame,
                                       [](const Keyframe& k, FrameId f) { return k.frame < f; });

@@ -38,10 +38,22 @@ class LoopGate {
   /// Decides about all that wait: no more will come.
   std::vector<Decision> decide_all();
 
+  std::size_t keyframes() const { return keyframes_.size(); }
+  bool has(FrameId keyframe) const;
+  void archive(auto& fields) {
+    fields(keyframes_, entered_, waiting_, joined_);
+    for (std::size_t i = 1; i < keyframes_.size(); ++i) fields.require(keyframes_[i - 1].frame < keyframes_[i].frame);
+    for (const auto* const loops : {&entered_, &waiting_})
+      for (const LoopConstraint& each : *loops) fields.require(has(each.match) && has(each.query));
+    for (const auto& [segment, earlier] : joined_) fields.require(earlier < segment);
+  }
+
  private:
   struct Keyframe {
     FrameId frame;
     TrajectoryPoint point;
+
+    void archive(auto& fields) { fields(frame, point); }
   };
   enum class Verdict { kNothing, kAgree, kContradict };
   const TrajectoryPoint& at(FrameId frame) const;

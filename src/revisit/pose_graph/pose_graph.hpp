@@ -18,6 +18,8 @@ struct PoseEdge {
   Matrix6 information = Matrix6::Identity();
   bool is_loop = false;  ///< may be wrong: its weight is found, the others' is 1
   double weight = 1.0;   ///< [0, 1], how far the last optimisation believed it
+
+  void archive(auto& fields) { fields(from, to, T_from_to, information, is_loop, weight); }
 };
 
 /// What an accelerometer said at a node: which way is up, a unit vector in the node's frame.
@@ -28,6 +30,8 @@ struct UpReading {
   int part = 0;                   ///< of the graph, counted from 0: parts that no edge joins have their own up
   double deviation_rad = 0.0035;  ///< standard deviation, beside what the accelerometer is off (weigh_ups)
   double weight = 1.0;            ///< [0, 1], how far the last optimisation believed it
+
+  void archive(auto& fields) { fields(node, up, sensor, part, deviation_rad, weight); }
 };
 
 /// Poses that hang together by relative measurements. Node 0 stays where it is. Belongs to one thread at a time.
@@ -43,6 +47,13 @@ class PoseGraph {
 
   /// All readings of gravity. Throws std::invalid_argument as add_edge(), or for an up that is no unit vector.
   void set_ups(std::vector<UpReading> readings);
+
+  void archive(auto& fields) {
+    fields(nodes_, edges_, ups_);
+    for (const PoseEdge& each : edges_)
+      fields.require(each.from < nodes_.size() && each.to < nodes_.size() && each.from != each.to);
+    for (const UpReading& each : ups_) fields.require(each.node < nodes_.size());
+  }
 
   const std::vector<Pose>& nodes() const { return nodes_; }
   const std::vector<PoseEdge>& edges() const { return edges_; }

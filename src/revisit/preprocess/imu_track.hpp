@@ -17,6 +17,9 @@ namespace revisit {
 class ImuTrack {
  public:
   void add(const Scan& scan);
+  void archive(auto& fields) {
+    fields(recent_, last_scan_s_, up_now_, usual_acceleration_, followed_s_, up_, rate_in_sweep_, turn_since_last_);
+  }
 
   /// Of the last scan, at its stamp, in its frame. Nothing where readings are missing around it.
   const std::optional<Eigen::Vector3f>& up() const { return up_; }
@@ -29,6 +32,8 @@ class ImuTrack {
   struct Reading {
     double stamp_s = 0.0;
     Eigen::Vector3d angular_radps, acceleration;
+
+    void archive(auto& fields) { fields(stamp_s, angular_radps, acceleration); }
   };
   void follow(const Reading& reading);
   bool covers(double from_s, double to_s) const;

@@ -17,6 +17,8 @@ struct IntensityScale {
   double min_raw = 0.0, median_raw = 0.0, max_raw = 0.0;  ///< over the sample
   bool is_reflectance = true;                             ///< false: the field plainly holds something else, or nothing
   std::string warning;                                    ///< empty, or what is wrong with the field
+
+  void archive(auto& fields) { fields(full_scale, min_raw, median_raw, max_raw, is_reflectance, warning); }
 };
 
 /// Learns the scale from the first scans of a sensor and keeps it from then on: a quantile of the positive readings, so
@@ -34,6 +36,7 @@ class IntensityScaleLearner {
   /// Of the scans so far.
   const IntensityScale& scale() const { return scale_; }
   bool is_settled() const { return scans_ >= kScans; }
+  void archive(auto& fields) { fields(scale_, positive_, scans_, readings_, has_ring_and_time_); }
 
  private:
   void update();

@@ -43,7 +43,8 @@ std::optional<std::size_t> cell_of(Direction at, float x, float y, float z) {
 
 }  // namespace
 
-SeenSpace::SeenSpace(std::span<const Point> points) : cells_(std::size_t{kAzimuths} * kElevations) {
+SeenSpace::SeenSpace(std::span<const Point> points) : cells_(kCells) {
+  static_assert(kCells == std::size_t{kAzimuths} * kElevations);
   // Directions first, in a loop that becomes SIMD.
   constexpr std::size_t kBlock = 256;
   std::array<Direction, kBlock> directions;

@@ -41,14 +41,22 @@ class SeenSpace {
   };
   Sector sector() const;
 
+  void archive(auto& fields) {
+    fields(cells_);
+    fields.require(cells_.empty() || cells_.size() == kCells);
+  }
+
   /// Nearest and farthest range of each cell in turn, cm, to be kept; empty where nothing was seen.
   std::vector<std::uint16_t> ranges_cm() const;
   /// Nothing where they are not those of all cells.
   static std::optional<SeenSpace> from_ranges_cm(std::span<const std::uint16_t> ranges);
 
  private:
+  static constexpr std::size_t kCells = 3600;
   struct Interval {
     std::uint16_t nearest_cm = UINT16_MAX, farthest_cm = 0;
+
+    void archive(auto& fields) { fields(nearest_cm, farthest_cm); }
   };
   std::vector<Interval> cells_;  ///< [azimuth][elevation]; empty: nothing was seen
 };

@@ -11,6 +11,8 @@ class Surface {
   struct Patch {
     Eigen::Vector3f point = Eigen::Vector3f::Zero();
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< of unit length, sign arbitrary; zero where it is not known
+
+    void archive(auto& fields) { fields(point, normal); }
   };
 
   Surface() = default;

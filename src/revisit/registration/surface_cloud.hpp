@@ -25,6 +25,11 @@ struct ThinCloud {
   float voxel_m = 1.f;
   Eigen::Vector3f up = Eigen::Vector3f::UnitZ();  ///< from the ground: another than z where the sensor is tilted
   SeenSpace seen;                                 ///< of the scan it was thinned from
+
+  void archive(auto& fields) {
+    fields(points, is_ground, intensity, voxel_m, up, seen);
+    fields.require(is_ground.size() == points.size() && intensity.size() == points.size() && voxel_m > 0.f);
+  }
 };
 
 /// Thins `points`, which are finite, with cubic voxels of `voxel_m`; points more than 1,024 voxels out are taken

@@ -104,9 +104,7 @@ std::optional<IntensityScanContext> to_descriptor(std::span<const std::byte> byt
   constexpr int kMost = 720;
   const auto fits = [](int value, int least) { return value >= least && value <= kMost; };
   if (!reader.is_at_end() || !fits(descriptor.rings, 1) || !fits(descriptor.sectors, 1) ||
-      !fits(descriptor.levels, 0) ||
-      descriptor.cells() != static_cast<std::size_t>(descriptor.rings) * static_cast<std::size_t>(descriptor.sectors) ||
-      descriptor.occupancy.size() != (descriptor.image_cells() + 63) / 64)
+      !fits(descriptor.levels, 0) || !descriptor.is_consistent())
     return std::nullopt;
   return descriptor;
 }

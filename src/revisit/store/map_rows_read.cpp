@@ -12,11 +12,18 @@ using store_internal::Statement;
 using store_internal::to_matrix;
 using store_internal::to_pose;
 
-Result<std::optional<std::string>> MapStore::note(const std::string& name) const {
-  Statement statement = database_->prepare("SELECT text FROM notes WHERE name=?");
-  if (statement.bind(name).step()) return std::optional(statement.text(0));
+Result<Bytes> MapStore::state() const {
+  if (database_->version < 5) return Bytes();  // none of them had any
+  Statement statement = database_->prepare("SELECT bytes,sum=checksum(bytes) FROM state");
+  Bytes state;
+  if (statement.step()) {
+    if (statement.integer(1) == 0)
+      return Error{database_->file + ": the state of its run is damaged: restore the file from a copy"};
+    const auto bytes = statement.bytes(0);
+    state.assign(bytes.begin(), bytes.end());
+  }
   if (const Status status = statement.status(); !status) return status.error();
-  return std::optional<std::string>();
+  return state;
 }
 
 Result<std::vector<StoredSession>> MapStore::sessions() const {
@@ -58,16 +65,11 @@ Result<std::vector<StoredKeyframe>> MapStore::keyframes() const {
   return rows;
 }
 
-Result<std::vector<StoredScan>> MapStore::scans() const { return last_scans(-1); }
-
-// SQLite takes a negative limit for none.
-Result<std::vector<StoredScan>> MapStore::last_scans(int count) const {
+Result<std::vector<StoredScan>> MapStore::scans() const {
   std::vector<StoredScan> rows;
   Statement statement = database_->prepare(
-      "SELECT * FROM (SELECT frame,keyframe,stamp_s,T_keyframe_lidar,T_odom_lidar,is_tracked,"
-      "sum=checksum(frame,keyframe,stamp_s,T_keyframe_lidar,T_odom_lidar,is_tracked) FROM scans ORDER BY frame DESC "
-      "LIMIT ?) ORDER BY frame");
-  statement.bind(std::int64_t{count});
+      "SELECT frame,keyframe,stamp_s,T_keyframe_lidar,T_odom_lidar,is_tracked,"
+      "sum=checksum(frame,keyframe,stamp_s,T_keyframe_lidar,T_odom_lidar,is_tracked) FROM scans ORDER BY frame");
   while (statement.step()) {
     const auto from_keyframe = to_pose(statement.bytes(3)), from_odom = to_pose(statement.bytes(4));
     if (!from_keyframe || !from_odom || statement.integer(6) == 0)
@@ -138,7 +140,7 @@ Result<std::vector<StoredFix>> MapStore::fixes() const {
 
 Result<std::vector<StoredUp>> MapStore::ups() const {
   std::vector<StoredUp> rows;
-  if (database_->version < store_internal::kVersion) return rows;  // none of them had any
+  if (database_->version < 4) return rows;  // none of them had any
   Statement statement = database_->prepare("SELECT frame,up,sum=checksum(frame,up) FROM gravity ORDER BY frame");
   while (statement.step()) {
     StoredUp row{{statement.integer(0)}};
@@ -276,9 +278,9 @@ Status MapStore::check() const {
   if (!whole.step()) return whole.status() ? Status(Error{database_->file + ": cannot be checked"}) : whole.status();
   if (whole.text(0) != "ok") return Error{database_->file + ": is damaged: " + whole.text(0)};
   const auto status_of = [](const auto& rows) { return rows ? ok() : Status(rows.error()); };
-  for (const Status& status :
-       {status_of(sessions()), status_of(keyframes()), status_of(map_poses()), status_of(place_poses()),
-        status_of(scans()), status_of(edges()), status_of(fixes()), status_of(ups()), status_of(earth())})
+  for (const Status& status : {status_of(sessions()), status_of(keyframes()), status_of(map_poses()),
+                               status_of(place_poses()), status_of(scans()), status_of(edges()), status_of(fixes()),
+                               status_of(ups()), status_of(earth()), status_of(state())})
     if (!status) return status;
   for (const PartTable& table : kParts) {
     Statement statement = database_->prepare(table.count_damaged);

@@ -202,9 +202,9 @@ Status MapStore::set_place_poses(std::span<const StoredMapPose> poses) {
   return database_->prepare("INSERT OR REPLACE INTO place_poses VALUES(0,?1,checksum(?1))").bind(rows).run();
 }
 
-Status MapStore::set_note(const std::string& name, const std::string& text) {
+Status MapStore::set_state(std::span<const std::byte> bytes) {
   if (const Status begun = database_->begin(); !begun) return begun;
-  return database_->prepare("INSERT OR REPLACE INTO notes VALUES(?,?)").bind(name).bind(text).run();
+  return database_->prepare("INSERT OR REPLACE INTO state VALUES(0,?1,checksum(?1))").bind(bytes).run();
 }
 
 }  // namespace revisit

@@ -44,6 +44,9 @@ CREATE TABLE answers(query INTEGER PRIMARY KEY, match INTEGER, score REAL NOT NU
 constexpr const char* kSinceVersion4 = R"(
 CREATE TABLE gravity(frame INTEGER PRIMARY KEY, up BLOB NOT NULL, sum INTEGER NOT NULL);
 )";
+constexpr const char* kSinceVersion5 = R"(
+CREATE TABLE state(id INTEGER PRIMARY KEY, bytes BLOB NOT NULL, sum INTEGER NOT NULL);
+)";
 
 // One session, whose facts were notes; the bytes of a key frame in its row.
 constexpr const char* kFrom2To3 = R"(
@@ -130,7 +133,8 @@ Status add_checksum_function(sqlite3* database, const std::string& file) {
 }
 
 Status create_schema(sqlite3* database, const std::string& file) {
-  return run_all(database, file, "BEGIN;" + std::string(kSchema) + kSinceVersion4 + numbers_of_the_file() + "COMMIT;");
+  return run_all(database, file,
+                 "BEGIN;" + std::string(kSchema) + kSinceVersion4 + kSinceVersion5 + numbers_of_the_file() + "COMMIT;");
 }
 
 Result<int> version_of(sqlite3* database, const std::string& file) {
@@ -159,7 +163,8 @@ Status upgrade(sqlite3* database, const std::string& file, int version) {
     sql += std::string(kSchema) + kFrom2To3;
     for (const char* table : kTablesOf2) sql += "DROP TABLE old_" + std::string(table) + ";";
   }
-  sql += kSinceVersion4 + numbers_of_the_file() + "COMMIT;";
+  if (version < 4) sql += kSinceVersion4;
+  sql += kSinceVersion5 + numbers_of_the_file() + "COMMIT;";
   Status status = run_all(database, file, sql);
   if (!status && sqlite3_get_autocommit(database) == 0) (void)run_all(database, file, "ROLLBACK");
   return status;

@@ -78,14 +78,13 @@ TEST(MapSchema, AMapOfVersion2IsUpgraded) {
   EXPECT_EQ(map->keyframes[1].point.T_segment_lidar.translation().x(), 2.0);
   EXPECT_EQ(*store->part({4}, MapStore::Part::kDescriptor), (Bytes{std::byte{1}, std::byte{2}, std::byte{3}}));
   EXPECT_TRUE(store->part({9}, MapStore::Part::kDescriptor)->empty());
-  EXPECT_EQ(store->note("mine")->value(), "kept");
-  EXPECT_FALSE(store->note("input")->has_value());
+  EXPECT_TRUE(store->state()->empty());
 }
 
 TEST(MapSchema, AMapOfVersion3IsUpgraded) {
   const fs::path file = map_of_version_2();
   (void)MapStore::open(file);
-  run_sql(file, "DROP TABLE gravity; PRAGMA user_version=3");
+  run_sql(file, "DROP TABLE gravity; DROP TABLE state; PRAGMA user_version=3");
   {  // where nothing can be written, too
     const auto reader = MapStore::open(file, MapStore::Access::kRead);
     ASSERT_TRUE(reader) << reader.error().message;
@@ -104,6 +103,28 @@ TEST(MapSchema, AMapOfVersion3IsUpgraded) {
   EXPECT_EQ((*store->ups())[0].up, Eigen::Vector3d(0.0, 0.6, 0.8));
 }
 
+TEST(MapSchema, AMapOfVersion4IsUpgraded) {
+  const fs::path file = map_of_version_2();
+  {
+    auto store = MapStore::open(file);
+    ASSERT_TRUE(store->add(StoredUp{{9}, {0.0, 0.6, 0.8}}) && store->commit());
+  }
+  run_sql(file, "DROP TABLE state; PRAGMA user_version=4");
+  {  // where nothing can be written, too
+    const auto reader = MapStore::open(file, MapStore::Access::kRead);
+    ASSERT_TRUE(reader) << reader.error().message;
+    EXPECT_TRUE(reader->check()) << reader->check().error().message;
+    EXPECT_EQ(reader->ups()->size(), 1u);
+    EXPECT_TRUE(reader->state()->empty());
+  }
+  auto store = MapStore::open(file);
+  ASSERT_TRUE(store) << store.error().message;
+  EXPECT_EQ(store->ups()->size(), 1u);
+  ASSERT_TRUE(store->set_state(Bytes(10, std::byte{1})));
+  ASSERT_TRUE(store->commit());
+  EXPECT_EQ(store->state()->size(), 10u);
+}
+
 TEST(MapSchema, AMapOfALaterVersionIsRefusedAndLeftAsItIs) {
   const fs::path file = map_of_version_2();
   run_sql(file, "PRAGMA user_version=99");
@@ -119,7 +140,8 @@ TEST(MapSchema, AlteredRowsAreFound) {
        {"UPDATE sessions SET recording='other.bag'", "UPDATE keyframes SET stamp_s=7.5 WHERE frame=9",
         "UPDATE descriptors SET bytes=x'010204'", "UPDATE places SET bytes=x'06'", "UPDATE clouds SET bytes=x''",
         "UPDATE scans SET is_tracked=0", "UPDATE edges SET information=zeroblob(287)||x'01'",
-        "UPDATE edges SET score=1", "UPDATE map_poses SET part=3", "UPDATE gravity SET frame=9"}) {
+        "UPDATE edges SET score=1", "UPDATE map_poses SET part=3", "UPDATE gravity SET frame=9",
+        "UPDATE state SET bytes=x'02'"}) {
     const fs::path file = map_of_version_2();
     {
       auto store = MapStore::open(file);
@@ -127,6 +149,7 @@ TEST(MapSchema, AlteredRowsAreFound) {
       const StoredMapPose pose{{4}, planar_pose(1, 2, 3), 0};
       ASSERT_TRUE(store->set_map_poses(std::span(&pose, 1)));
       ASSERT_TRUE(store->add(StoredUp{{4}}));
+      ASSERT_TRUE(store->set_state(Bytes(1, std::byte{1})));
       ASSERT_TRUE(store->commit());
       ASSERT_TRUE(store->check()) << store->check().error().message;
     }

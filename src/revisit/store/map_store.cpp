@@ -1,7 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
+
 #include <revisit/store/internal/map_database.hpp>
 
 namespace revisit {
+namespace {
+
+constexpr std::array kEndings = {"", "-wal", "-shm", "-journal"};  // a map's file, and those that SQLite has beside it
+
+// Takes away what a failed beginning leaves.
+class Beginning {
+ public:
+  explicit Beginning(const std::filesystem::path& file) : file_(file) {
+    std::error_code failure;
+    is_kept_ = file.empty() || std::filesystem::exists(file, failure);
+  }
+  ~Beginning() {
+    std::error_code ignored;
+    if (!is_kept_)
+      for (const char* ending : kEndings) std::filesystem::remove(file_.string() + ending, ignored);
+  }
+  Beginning(const Beginning&) = delete;
+  Beginning& operator=(const Beginning&) = delete;
+  void keep() { is_kept_ = true; }
+
+ private:
+  std::filesystem::path file_;
+  bool is_kept_ = true;
+};
+
+}  // namespace
 
 MapStore::MapStore(std::unique_ptr<Database> database) : database_(std::move(database)) {}
 MapStore::MapStore(MapStore&&) noexcept = default;
@@ -23,6 +51,7 @@ const std::string& MapStore::file() const { return database_->file; }
 Result<MapStore> MapStore::create_temporary() { return create({}); }
 
 Result<MapStore> MapStore::create(const std::filesystem::path& file) {
+  Beginning beginning(file);
   auto database = Database::connect(file, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
   if (!database) return database.error();
   // What is taken out makes room for what comes, and goes back to the system at the end.
@@ -30,6 +59,7 @@ Result<MapStore> MapStore::create(const std::filesystem::path& file) {
   if (const Status status = (*database)->journal(); !status) return status.error();
   if (const Status status = store_internal::create_schema((*database)->handle.get(), file.string()); !status)
     return status.error();
+  beginning.keep();
   return MapStore(*std::move(database));
 }
 
@@ -38,7 +68,7 @@ Status MapStore::remove_file(const std::filesystem::path& file) {
   if (!std::filesystem::exists(file, failure)) return ok();
   const auto lock = store_internal::WriterLock::take(file);
   if (!lock) return lock.error();
-  for (const char* ending : {"", "-wal", "-shm", "-journal"})
+  for (const char* ending : kEndings)
     if (std::filesystem::remove(file.string() + ending, failure); failure)
       return Error{file.string() + ending + ": cannot be removed: " + failure.message()};
   return ok();

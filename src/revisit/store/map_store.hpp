@@ -150,9 +150,10 @@ class MapStore {
   Status read_index(std::size_t offset, std::span<std::byte> piece) const;
   Result<std::vector<StoredMapPose>> place_poses() const;
 
-  /// A note beside the map. A second one of the same name replaces the first.
-  Status set_note(const std::string& name, const std::string& text);
-  Result<std::optional<std::string>> note(const std::string& name) const;
+  /// What the run that makes the map has in memory, to go on from exactly there. It replaces that of before.
+  Status set_state(std::span<const std::byte> bytes);
+  /// Empty where there is none.
+  Result<Bytes> state() const;
 
   /// From here to release(), what is read is the map at one moment, whatever others write meanwhile. Not for long: it
   /// keeps others from beginning to write.
@@ -167,8 +168,6 @@ class MapStore {
   /// In the order of their frames, the bytes left out.
   Result<std::vector<StoredKeyframe>> keyframes() const;
   Result<std::vector<StoredScan>> scans() const;
-  /// The last so many of them.
-  Result<std::vector<StoredScan>> last_scans(int count) const;
   /// In the order in which they were added.
   Result<std::vector<StoredEdge>> edges() const;
   Result<std::vector<CandidateRow>> answers() const;

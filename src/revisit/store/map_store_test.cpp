@@ -43,7 +43,8 @@ TEST(MapStore, GivesBackWhatItWasGiven) {
     ASSERT_TRUE(store->add(edge));
     ASSERT_TRUE(store->add(CandidateRow{{9}, FrameId{4}, 1.5, true, ""}));
     ASSERT_TRUE(store->add(CandidateRow{{10}, std::nullopt, 0.0, false, "no place like it"}));
-    ASSERT_TRUE(store->set_note("input", "here"));
+    ASSERT_TRUE(store->set_state(Bytes(1000, std::byte{3})));
+    ASSERT_TRUE(store->set_state(Bytes(900, std::byte{7})));
     ASSERT_TRUE(store->commit());
   }
   const auto store = MapStore::open(file);
@@ -75,8 +76,7 @@ TEST(MapStore, GivesBackWhatItWasGiven) {
   EXPECT_EQ((*answers)[0].match, FrameId{4});
   EXPECT_FALSE((*answers)[1].match);
   EXPECT_EQ((*answers)[1].reason, "no place like it");
-  EXPECT_EQ(store->note("input")->value(), "here");
-  EXPECT_FALSE(store->note("nothing")->has_value());
+  EXPECT_EQ(*store->state(), Bytes(900, std::byte{7})) << "the last one";
 }
 
 // Whatever ends the program: what was committed is there, what was not is not.
@@ -106,13 +106,13 @@ TEST(MapStore, AReaderFindsTheMapWholeAfterAKillWithoutALog) {
   const auto file = fresh_file("journal");
   {
     auto store = MapStore::create(file);
-    ASSERT_TRUE(store && store->add(keyframe(1)) && store->set_note("name", "before") && store->commit());
+    ASSERT_TRUE(store && store->add(keyframe(1)) && store->set(StoredSession{0, "before", "", ""}) && store->commit());
   }
   const pid_t child = fork();
   if (child == 0) {
     sqlite3* raw = nullptr;
     sqlite3_open(file.c_str(), &raw);
-    sqlite3_exec(raw, "PRAGMA journal_mode=DELETE; BEGIN; UPDATE notes SET text='half done'", nullptr, nullptr,
+    sqlite3_exec(raw, "PRAGMA journal_mode=DELETE; BEGIN; UPDATE sessions SET recording='half done'", nullptr, nullptr,
                  nullptr);
     sqlite3_db_cacheflush(raw);
     ::kill(getpid(), SIGKILL);
@@ -122,7 +122,7 @@ TEST(MapStore, AReaderFindsTheMapWholeAfterAKillWithoutALog) {
   ASSERT_TRUE(std::filesystem::exists(file.string() + "-journal"));
   const auto store = MapStore::open(file, MapStore::Access::kRead);
   ASSERT_TRUE(store) << store.error().message;
-  EXPECT_EQ(store->note("name")->value(), "before");
+  EXPECT_EQ(store->sessions()->at(0).recording, "before");
   EXPECT_EQ(store->keyframes()->size(), 1u);
 }
 

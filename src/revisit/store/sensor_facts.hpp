@@ -17,6 +17,8 @@ struct SensorFacts {
   TypicalAgreement typical;
   std::size_t typical_pairs = 0;      ///< of consecutive scans that it was learnt from
   double look_alikes_log_odds = 0.0;  ///< LookAlikes
+
+  void archive(auto& fields) { fields(intensity_scale, typical, typical_pairs, look_alikes_log_odds); }
 };
 
 /// As StoredSession::sensor holds them.

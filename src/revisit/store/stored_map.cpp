@@ -14,8 +14,6 @@
 namespace revisit {
 namespace {
 
-constexpr std::ptrdiff_t kSurroundings_keyframes = 40;  // some 60 m: what odometry can see of its map
-
 Error out_of_order(FrameId keyframe) {
   return {"key " + to_text(keyframe) + " of the map does not follow the one before it"};
 }
@@ -134,33 +132,6 @@ Status restore_places(const MapStore& store, const StoredMap& map, const Descrip
     if (Status same = check_grid(*descriptor, grid); !same) return same;
     restore(each, *descriptor);
   }
-  return ok();
-}
-
-Status restore_odometry(const MapStore& store, const StoredMap& map, Odometry& odometry, KeyframeSelection& selection) {
-  const auto scans = store.last_scans(2);
-  if (!scans) return scans.error();
-  if (scans->empty() || !std::isfinite(scans->back().stamp_s))
-    return Error{"the map has key frames, but its last scan has no time or is not there"};
-  const auto& keyframes = map.keyframes;
-  auto first = keyframes.end() - std::min(kSurroundings_keyframes, std::ssize(keyframes));
-  // Nothing from before a loss of track: how that lies to what came after is not known.
-  const int segment = keyframes.back().point.segment;
-  while (first->point.segment != segment) ++first;
-  for (auto it = first; it != keyframes.end(); ++it) {
-    const auto points = read_map_points(store, it->frame.frame);
-    if (!points) return points.error();
-    if (!points->empty()) odometry.restore_map(it->frame.stamp_s, *points, it->point.T_segment_lidar);
-    if (it + 1 == keyframes.end()) selection.set_last(it->point.T_segment_lidar, SeenSpace(*points));
-  }
-  const StoredScan& last = scans->back();
-  std::optional<Twist> motion;
-  if (scans->size() == 2 && session_of(scans->front().frame) == session_of(last.frame)) {
-    const StoredScan& before = scans->front();
-    if (const double gap_s = last.stamp_s - before.stamp_s; gap_s > 0.0 && std::isfinite(gap_s))
-      motion = twist_of(before.T_odom_lidar.inverse() * last.T_odom_lidar, gap_s);
-  }
-  odometry.restore(last.stamp_s, last.T_odom_lidar, motion, segment);
   return ok();
 }
 

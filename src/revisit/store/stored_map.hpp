@@ -9,8 +9,6 @@
 #include <revisit/core/exclusion.hpp>
 #include <revisit/core/trajectory_point.hpp>
 #include <revisit/descriptors/intensity_scan_context.hpp>
-#include <revisit/odometry/keyframe_selection.hpp>
-#include <revisit/odometry/odometry.hpp>
 #include <revisit/pose_graph/keyframe_graph.hpp>
 #include <revisit/store/map_store.hpp>
 
@@ -47,8 +45,5 @@ Status restore_places(const MapStore& store, const StoredMap& map, const Descrip
 /// The point of a place whose pose in the map is known: those of one part lie to each other as the map has them,
 /// whatever was travelled between them. Its segment is none of those that odometry counts.
 TrajectoryPoint point_in_map(const Pose& T_map_lidar, int part);
-
-/// The surroundings from the latest key frames that have a cloud, then the motion from the last two scans.
-Status restore_odometry(const MapStore& store, const StoredMap& map, Odometry& odometry, KeyframeSelection& selection);
 
 }  // namespace revisit

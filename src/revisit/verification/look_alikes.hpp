@@ -24,6 +24,10 @@ class LookAlikes {
   double log_odds_in_map() const;
 
   static constexpr double kNotRegistered = -20.0;
+  void archive(auto& fields) {
+    fields(scores_, next_);
+    known_.reset();
+  }
 
  private:
   double correction(double most_trust) const;

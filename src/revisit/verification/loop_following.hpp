@@ -49,6 +49,7 @@ class LoopFollowing {
   /// The log odds that loops of the last metres add to this pose; 0 where none of them agrees with it.
   double support_log_odds(const std::optional<TrajectoryPoint>& query, const std::optional<TrajectoryPoint>& place,
                           const Pose& T_match_query) const;
+  void archive(auto& fields) { fields(anchors_); }
 
  private:
   struct Anchor {
@@ -56,6 +57,7 @@ class LoopFollowing {
     FrameId match;
     Pose T_place_query_segment = Pose::Identity();  ///< the query's segment in the frame of the place's
     double log_odds = 0.0;
+    void archive(auto& fields) { fields(query, place, match, T_place_query_segment, log_odds); }
     double log_odds_after(double motion_m) const;
   };
   std::deque<Anchor> anchors_;

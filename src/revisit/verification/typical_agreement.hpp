@@ -16,6 +16,8 @@ namespace revisit {
 struct TypicalAgreement {
   double inlier_ratio = 0.9;            ///< in (0, 1]
   double intensity_correlation = 0.95;  ///< in (0, 1]
+
+  void archive(auto& fields) { fields(inlier_ratio, intensity_correlation); }
 };
 
 /// Learns the typical agreement from pairs of consecutive scans while they come in. Belongs to one thread at a time.
@@ -34,6 +36,9 @@ class TypicalAgreementEstimate {
   /// Starts from what an earlier run learnt, worth as much as `pairs` pairs.
   void restore(const TypicalAgreement& typical, std::size_t pairs);
   std::size_t pairs() const { return inlier_pairs_; }
+  void archive(auto& fields) {
+    fields(correlations_, correlation_pairs_, inlier_pairs_, inlier_ratio_sum_, recent_inlier_ratio_);
+  }
 
  private:
   void add_correlation(double correlation, std::uint32_t times);

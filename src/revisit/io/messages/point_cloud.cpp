@@ -172,7 +172,7 @@ Result<Scan> to_scan(const PointCloudView& cloud, const std::optional<double>& s
   if (time == nullptr) {  // seconds and nanoseconds apart
     time = find_field(cloud, {"time_sec", "timestamp_sec", "stamp_sec", "t_sec"});
     time_ns = find_field(cloud, {"time_nsec", "timestamp_nsec", "stamp_nsec", "t_nsec"});
-    if (time_ns == nullptr) time = nullptr;
+    if (time == nullptr || time_ns == nullptr) time = time_ns = nullptr;
   }
   if (intensity == nullptr) log_to(log, LogLevel::kWarning, what + ": no intensity field; 0 is used");
 

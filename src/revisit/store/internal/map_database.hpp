@@ -59,10 +59,10 @@ struct MapStore::Database {
       return status.error();
     return database;
   }
-  // A commit is with the system when it returns: it survives the end of the program, whatever ends it.
+  // A commit is on the disk when it returns: it survives the end of the program, and of the power.
   Status journal() {
     writes = true;
-    for (const char* sql : {"PRAGMA journal_mode=WAL", "PRAGMA synchronous=NORMAL", "PRAGMA cache_size=-8000"})
+    for (const char* sql : {"PRAGMA journal_mode=WAL", "PRAGMA synchronous=FULL", "PRAGMA cache_size=-8000"})
       if (const Status status = run(sql); !status) return status;
     return ok();
   }
