@@ -93,6 +93,13 @@ function timePart(view: View): HTMLElement | null {
       h("meter", { min: 0, max: most, value: ms, "aria-label": `${name}: ${ms.toFixed(2)} ms` }), h("output", {}, `${number(ms)} ms`))));
 }
 
+function memoryPart(view: View): HTMLElement | null {
+  const used = view.run.memory_mb ?? [];
+  if (used.length < 2) return null;
+  return h("section", {}, chart("Memory of the program", { title: "scan", range: [0, used.at(-1)![0]] }, { title: "MB", range: [0, largest(used, 1) * 1.05] },
+    [{ points: used, colour: kinds[0]!, kind: "line" }]));
+}
+
 function matrixPart(view: View): HTMLElement | null {
   const accepted = view.loops.filter((loop) => loop.accepted);
   if (accepted.length === 0) return null;
@@ -107,7 +114,7 @@ function matrixPart(view: View): HTMLElement | null {
 export function chartsTab(view: View, setThreshold: (score: number) => void): HTMLElement {
   const counts = Object.entries(view.run.counts ?? {});
   return h("div", { class: "tab" },
-    precisionRecallPart(view, setThreshold), probabilityPart(view), errorPart(view), timePart(view), matrixPart(view),
+    precisionRecallPart(view, setThreshold), probabilityPart(view), errorPart(view), timePart(view), memoryPart(view), matrixPart(view),
     view.has_truth ? null : h("p", { class: "hint" }, "With a reference (revisit evaluate FOLDER --reference POSES) this page also shows precision, recall and errors."),
     counts.length > 0 ? h("section", {}, h("h3", {}, "Counts"), h("dl", {}, ...counts.flatMap(([name, value]) => [h("dt", {}, name.replaceAll("_", " ")), h("dd", {}, String(value))]))) : null);
 }

@@ -37,6 +37,13 @@ export function textureOf(scale: Scale): DataTexture {
   return texture;
 }
 
-export function gradientOf(scale: Scale): string {
-  return `linear-gradient(to right, ${scales[scale].join(", ")})`;
+/** `from`: the part of the scale that is left out. */
+export function gradientOf(scale: Scale, from = 0): string {
+  const stops = Array.from({ length: 9 }, (_, i) => `#${colourAt(scale, from + ((1 - from) * i) / 8).getHexString()}`);
+  return `linear-gradient(to right, ${stops.join(", ")})`;
 }
+
+const loops_from = 0.35;  // of viridis: what is darker is not seen on a dark page
+/** Of loops, by probability from one half to one. */
+export const loopColour = (probability: number): Color => colourAt("viridis", loops_from + (1 - loops_from) * (probability - 0.5) * 2);
+export const loopGradient = gradientOf("viridis", loops_from);

@@ -6,7 +6,7 @@ import { LineGeometry } from "three/addons/lines/LineGeometry.js";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
-import { colourAt, ofFalse, ofOdometry, ofRefused, ofTruth } from "./colours";
+import { colourAt, loopColour, ofFalse, ofOdometry, ofRefused, ofTruth } from "./colours";
 import { positionOf, sessionOf, type Loop, type Triple, type View } from "./model";
 
 const material = (width: number, options: object = {}) =>
@@ -86,7 +86,7 @@ export class LoopLines {
   colour(loop: Loop): THREE.Color {
     if (loop.accepted && loop.right === false) return new THREE.Color(ofFalse);
     if (!loop.accepted || loop.score < this.threshold) return new THREE.Color(ofRefused);
-    return colourAt("viridis", 0.35 + 0.65 * ((loop.probability ?? 1) - 0.5) * 2);
+    return loopColour(loop.probability ?? 1);
   }
 
   draw() {

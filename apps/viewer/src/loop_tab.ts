@@ -72,7 +72,7 @@ export class LoopTab {
         place.textContent = `${name}: ${(problem as Error).message}`;
       }
     };
-    if (loop.pose) void add(overlay(view.name, loop.query, loop.match, loop.pose), "Scans");
+    if (loop.pose) void add(overlay(view.name, loop.query, loop.match, loop.pose, loop.true_pose), "Scans");
     void add(descriptors(view.name, loop.query, loop.match, loop.pose), "Descriptors");
   }
 }

@@ -34,7 +34,8 @@ function summaryOf(view: View): string {
 function start(views: View[]) {
   const canvas = h("canvas", { id: "stage", tabindex: 0, "aria-label": "The map in three dimensions" });
   const notice = h("p", { id: "notice", role: "status", hidden: true });
-  const scale = h("div", { id: "scale" }), up = h("div", { id: "up", title: "The map's y axis" }, "y");
+  const scale = h("div", { id: "scale" }), north_deg = views[0]!.north_deg;
+  const up = h("div", { id: "up", title: north_deg === undefined ? "The map's y axis" : "North" }, north_deg === undefined ? "y" : "N");
   const stageBox = h("main", {}, canvas, scale, up, notice);
   app.replaceChildren(stageBox);
   const stage = new Stage(canvas);
@@ -42,35 +43,39 @@ function start(views: View[]) {
   const first = () => stage.sides[0]!;
   const view = views[0]!;
 
-  let selected: Loop | null = null;
+  let selected: Loop | null = null, walked: Side | null = null;  // the keys go through the loops of the side clicked last
   const loopTab = new LoopTab((by) => step(by));
   const select = (loop: Loop | null, side = first()) => {
     selected = loop;
+    if (loop) walked = side;
     for (const each of stage.sides) each.loops.select(each === side ? loop : null);
     loopTab.show(side.view, loop);
     if (loop) tabs.show("Loop");
     stage.draw();
   };
   const step = (by: number) => {
-    const loops = first().loops.shown.length > 0 ? first().loops.shown : first().view.loops.filter((l) => l.accepted || first().loops.showRefused);
+    const side = walked ?? first();
+    const loops = side.loops.shown.length > 0 ? side.loops.shown : side.view.loops.filter((l) => l.accepted || side.loops.showRefused);
     if (loops.length === 0) return;
     const at = selected ? loops.indexOf(selected) : by > 0 ? -1 : 0;
     const loop = loops[(at + by + loops.length) % loops.length]!;
-    const place = positionOf(first().view, loop.query);
+    const place = positionOf(side.view, loop.query);
     if (place) stage.lookAt(place);
-    select(loop);
+    select(loop, side);
   };
 
   const heights = heightsOf(view);
   const mapTab = new MapTab(stage, view, heights);
   for (const side of stage.sides) side.points?.material.uniforms.heights!.value.set(...heights);
-  const setThreshold = (score: number) => {
-    first().loops.threshold = score;
-    first().loops.draw();
-    stage.draw();
-  };
-  const tabs = makeTabs({ Map: mapTab.root, Loop: loopTab.root, Charts: chartsTab(view, setThreshold) });
-  const timeline = new Timeline(stage, first());
+  const charts = h("div", {}, ...stage.sides.flatMap((side) => [
+    stage.sides.length > 1 ? h("h2", { class: "tab" }, side.view.title) : null,
+    chartsTab(side.view, (score) => {
+      side.loops.threshold = score;
+      side.loops.draw();
+      stage.draw();
+    })].filter((part) => part !== null)));
+  const tabs = makeTabs({ Map: mapTab.root, Loop: loopTab.root, Charts: charts });
+  const timeline = new Timeline(stage);
   const title = views.map((each) => each.title).join("   |   ");
   const summary = h("p", {}, summaryOf(view));
   const header = h("header", {}, h("h1", {}, title), summary);
@@ -82,7 +87,7 @@ function start(views: View[]) {
   };
   stage.onDraw = () => {
     showScale(scale, stage.metresAPixel());
-    up.style.transform = `rotate(${stage.controls.getAzimuthalAngle()}rad)`;
+    up.style.transform = `rotate(${stage.controls.getAzimuthalAngle() - ((north_deg ?? 0) * Math.PI) / 180}rad)`;
     mapTab.status.textContent = `${stage.drawn.toLocaleString("en")} points drawn`;
     const failure = stage.sides.map((side) => side.points?.failure).find((text) => text);
     if (failure) say(`A part of the map cannot be shown: ${failure}`);

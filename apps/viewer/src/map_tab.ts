@@ -1,20 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 // How the map is drawn.
-import { gradientOf, kinds, ofFalse, ofOdometry, ofRefused, ofTruth } from "./colours";
+import { gradientOf, kinds, loopGradient, ofFalse, ofOdometry, ofRefused, ofTruth } from "./colours";
 import { choice, h, slider, toggle } from "./dom";
 import type { View } from "./model";
 import { scaleOf, type ColourBy } from "./points";
 import type { Stage } from "./stage";
 
 function legend(by: ColourBy, view: View, heights: [number, number]): HTMLElement {
-  const scale = scaleOf[by];
-  if (!scale) {
+  const colours = scaleOf[by];
+  if (!colours) {
     return h("p", { class: "keys" }, ...view.sessions.map((name, i) =>
       h("span", { class: "key", style: `--key:${kinds[i % kinds.length]}` }, `session ${i}: ${name.split("/").pop()}`)));
   }
   const ends = { intensity: ["weak reflection", "strong"], height: [`${heights[0].toFixed(0)} m`, `${heights[1].toFixed(0)} m`], time: ["first seen early", "late"], session: ["", ""] }[by];
-  return h("div", { class: "legend" }, h("span", {}, ends[0]), h("i", { style: `background:${gradientOf(scale)}` }), h("span", {}, ends[1]));
+  return scale(gradientOf(colours), ends[0]!, ends[1]!);
 }
+
+function scale(colours: string, from: string, to: string): HTMLElement {
+  return h("div", { class: "legend" }, h("span", {}, from), h("i", { style: `background:${colours}` }), h("span", {}, to));
+}
+
+const duration_s = ({ scans }: View): number => (scans.stamp_s.at(-1) ?? 0) - (scans.stamp_s[0] ?? 0);
 
 export class MapTab {
   readonly root: HTMLElement;
@@ -44,9 +50,11 @@ export class MapTab {
       slider("Highest shown", low, high, 0.5, high, (value) => uniform("highZ", value === high ? 1e9 : value), " m"),
       toggle("Points", true, (on) => each((side) => side.points && (side.points.group.visible = on))()),
       toggle("Trajectory, coloured by time", true, (on) => each((side) => (side.trajectories.after.visible = on))()),
+      scale(gradientOf("cividis"), "0 s", `${duration_s(view).toFixed(0)} s`),
       has(view.scans.odometry) ? toggle("Odometry, before closing loops", false, (on) => each((side) => (side.trajectories.before.visible = on))()) : null,
       has(view.scans.truth) ? toggle("Truth", false, (on) => each((side) => (side.trajectories.truth.visible = on))()) : null,
       toggle("Loops, coloured by probability", true, (on) => each((side) => (side.loops.group.visible = on))()),
+      scale(loopGradient, "0.5", "1"),
       toggle("Refused candidates", false, (on) => each((side) => {
         side.loops.showRefused = on;
         side.loops.draw();

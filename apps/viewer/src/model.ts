@@ -17,6 +17,7 @@ export interface Loop {
   right?: boolean;
   error_m?: number;
   error_deg?: number;
+  true_pose?: number[];
   evidence?: Record<string, number>;
 }
 
@@ -35,7 +36,8 @@ export interface View {
   command: string;
   input: string;
   sessions: string[];
-  run: { version?: string; counts?: Record<string, number>; ms_per_scan?: Record<string, number>; interrupted?: boolean };
+  run: { version?: string; counts?: Record<string, number>; ms_per_scan?: Record<string, number>; memory_mb?: [number, number][]; interrupted?: boolean };
+  north_deg?: number;
   has_truth: boolean;
   has_tiles: boolean;
   revisits: number;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Two scans laid on each other, and their descriptors side by side, on plain canvases.
 import { Vector3 } from "three";
-import { colourAt, kinds } from "./colours";
-import { h } from "./dom";
+import { colourAt, kinds, ofTruth } from "./colours";
+import { h, toggle } from "./dom";
 import { readFloats, readJson } from "./files";
 import { toMatrix } from "./model";
 
@@ -44,23 +44,30 @@ function drawScale(context: CanvasRenderingContext2D, range_m: number) {
   context.fillText(`${metres} m`, 8, height - 14);
 }
 
-export async function overlay(view: string, query: number, match: number, pose: number[]): Promise<HTMLElement> {
+export async function overlay(view: string, query: number, match: number, pose: number[], true_pose?: number[]): Promise<HTMLElement> {
   const [a, b] = await Promise.all([readFloats(`${view}/scans/${match}.bin`), readFloats(`${view}/scans/${query}.bin`)]);
   if (a.length === 0 && b.length === 0) return h("p", { class: "hint" }, "The map keeps no points of these two scans.");
   const ranges: number[] = [];
   for (let i = 0; i < a.length; i += 40) ranges.push(Math.max(Math.abs(a[i]!), Math.abs(a[i + 1]!)));
   ranges.sort((x, y) => x - y);
   const range_m = Math.min(80, Math.max(8, 1.1 * (ranges[Math.floor(0.95 * ranges.length)] ?? 30)));
-  const pictures = ([[1, side], [2, 120]] as const).map(([along, height]) => {
-    const [canvas, context] = canvasOf(side, height, along === 1 ? "Both scans from above" : "Both scans from the side");
-    drawPoints(context, a, null, kinds[0]!, range_m, along);
-    drawPoints(context, b, pose, kinds[1]!, range_m, along);
-    drawScale(context, range_m);
-    return canvas;
-  });
-  return h("figure", {}, ...pictures, h("figcaption", {},
-    h("span", { class: "key", style: `--key:${kinds[0]}` }, "earlier scan"), h("span", { class: "key", style: `--key:${kinds[1]}` }, "this scan, at the pose that was found"),
-    " From above (x to the right), and from the side."));
+  const views = ([[1, side], [2, 120]] as const).map(([along, height]) =>
+    ({ along, canvas: canvasOf(side, height, along === 1 ? "Both scans from above" : "Both scans from the side") }));
+  const draw = (showTruth: boolean) => {
+    for (const { along, canvas: [canvas, context] } of views) {
+      context.clearRect(0, 0, canvas.width, canvas.height);
+      drawPoints(context, a, null, kinds[0]!, range_m, along);
+      drawPoints(context, b, pose, kinds[1]!, range_m, along);
+      if (showTruth) drawPoints(context, b, true_pose!, ofTruth, range_m, along);
+      drawScale(context, range_m);
+    }
+  };
+  draw(false);
+  return h("figure", {}, ...views.map(({ canvas }) => canvas[0]), true_pose ? toggle("This scan at its true pose, too", false, draw) : null,
+    h("figcaption", {}, h("span", { class: "key", style: `--key:${kinds[0]}` }, "earlier scan"),
+      h("span", { class: "key", style: `--key:${kinds[1]}` }, "this scan, at the pose that was found"),
+      true_pose ? h("span", { class: "key", style: `--key:${ofTruth}` }, "at the true pose") : null,
+      " From above (x to the right), and from the side."));
 }
 
 function drawDescriptor(context: CanvasRenderingContext2D, d: Descriptor, shift: number) {

@@ -51,11 +51,13 @@ export class Stage {
   drawn = 0;
   onDraw = () => {};
   private isWaiting = false;
+  private height = 0;
 
   constructor(readonly canvas: HTMLCanvasElement) {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
     this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
     THREE.ColorManagement.enabled = true;
+    this.orthographic.userData.half = 50;
     for (const camera of [this.perspective, this.orthographic]) camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.screenSpacePanning = false;
@@ -156,7 +158,9 @@ export class Stage {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (width === 0 || height === 0) return;
     this.renderer.setSize(width, height, false);
-    const aspect = this.aspect(), half = this.orthographic.userData.half ?? 50;
+    if (this.height > 0) this.orthographic.userData.half *= height / this.height;  // more is seen, not larger
+    this.height = height;
+    const aspect = this.aspect(), half = this.orthographic.userData.half;
     this.perspective.aspect = aspect;
     this.perspective.updateProjectionMatrix();
     Object.assign(this.orthographic, { left: -half * aspect, right: half * aspect, top: half, bottom: -half });

@@ -20,9 +20,15 @@ export function slam(name, options = {}, more = []) {
   return { drive: file, out };
 }
 
+const children = new Set();
+/** Ends what a failed test left running: node would wait for it. */
+export const stopAll = () => children.forEach((child) => child.kill("SIGKILL"));
+
 /** A command that serves a page, until the program has named its address. */
 export function start(...args) {
   const child = spawn(program, args, { stdio: ["ignore", "pipe", "pipe"] });
+  children.add(child);
+  child.on("exit", () => children.delete(child));
   let said = "";
   return new Promise((resolve, reject) => {
     const listen = (text) => {

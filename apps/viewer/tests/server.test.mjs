@@ -63,6 +63,15 @@ test("scans and descriptors come as they were made", async (context) => {
     assert.equal((await fetch(address + path)).status, 404, path);
 });
 
+test("what is large is sent as it is: to compress it takes longer than to send it", async (context) => {
+  const address = await serve(context, out);
+  for (const path of ["viewer.js", "a/view.json", "a/tiles/tileset.json", "a/tiles/0_0_0_0.glb"]) {
+    const answer = await fetch(address + path, { headers: { "Accept-Encoding": "gzip, deflate, br" } });
+    assert.equal(answer.status, 200, path);
+    assert.equal(answer.headers.get("content-encoding"), null, path);
+  }
+});
+
 test("nothing outside the view is served", async (context) => {
   writeFileSync(join(out, "secret.txt"), "secret");
   symlinkSync(join(out, "secret.txt"), join(out, "tiles", "9_9_9_9.glb"));
