@@ -1,11 +1,11 @@
 # The front door on a bare Debian 12 machine. `make demo` and `make test` install what is missing, build and run.
-.PHONY: demo viewer python ros1 ros1-demo ros2 test oracles build configure packages bench lint format sanitize clean
+.PHONY: demo viewer page python ros1 ros1-demo ros2 deb site sbom fuzz faults kills test oracles build configure packages bench lint format sanitize sanitize-readers clean
 JOBS ?= $(shell nproc)
 # What ccache keeps of one clone serves the others.
 export CCACHE_BASEDIR ?= $(CURDIR)
 export CCACHE_NOHASHDIR ?= 1
 
-demo: packages viewer configure
+demo: packages page configure
 	cmake --build --preset release --parallel $(JOBS) --target revisit
 	@ln -sfn release/revisit build/revisit
 	@scripts/demo.sh
@@ -38,15 +38,49 @@ python: packages viewer
 	cd out/python && venv/bin/python -m pytest -q -p no:cacheprovider ../../bindings/python/tests
 	@ls -sh out/python/*.whl
 
+# Debian packages in out/deb, looked at by lintian.
+deb: build
+	@scripts/install_packages.sh dpkg-dev fakeroot file help2man lintian
+	@help2man --no-info --name "recognise places from LiDAR" build/release/revisit | gzip -9n > build/release/debian/revisit.1.gz
+	@rm -rf out/deb && cd build/release && cpack -G DEB > cpack.log || { cat cpack.log; exit 1; }
+	@rm -rf out/deb/_CPack_Packages
+	@ls -sh out/deb/*.deb
+	lintian --fail-on error out/deb/*.deb
+
+# The documentation in out/site/index.html.
+site:
+	@scripts/install_packages.sh doxygen mkdocs mkdocs-material
+	@scripts/site.sh
+
+# What the program is made of, with versions: out/sbom.json (CycloneDX).
+sbom: build
+	@scripts/sbom.py build/release/revisit out/sbom.json
+
+# Every reader against clang's fuzzer: half an hour each; SECONDS=60 for a look.
+fuzz: build
+	@scripts/fuzz.sh $(SECONDS)
+
+# Every write, sync, rename, opening and allocation fails once: hours; MOST=50 for some of each.
+faults: build
+	tests/faults/run_faults.py build/release/revisit build/release/tests/libfail_call.so --most $(or $(MOST),0)
+
+# slam is killed, and loses its power, at random moments, and is resumed: 200 times, or KILLS=N, of each way to run it.
+kills: build
+	tests/resume_test.py build/release/revisit --power build/release/tests/liblose_power.so --kills $(or $(KILLS),200)
+
 test: oracles browser build
 	ctest --preset release --parallel $(JOBS)
 
-build: packages viewer configure
+build: packages page configure
 	cmake --build --preset release --parallel $(JOBS)
 	@ln -sfn release/revisit build/revisit
 
-configure: packages | viewer
+configure: packages | page
 	@cmake --preset release --log-level=NOTICE > /dev/null
+
+# Without npm, or its registry, the program is built without its page.
+page: packages
+	@$(MAKE) --no-print-directory viewer || { [ -z "$$CI" ] && echo "the page of revisit view is left out: npm could not build it (above)"; }
 
 # The page of `revisit view`, which the program carries: rebuilt where its sources are newer.
 viewer: apps/viewer/dist/viewer.js
@@ -55,7 +89,7 @@ apps/viewer/dist/viewer.js: apps/viewer/node_modules/.package-lock.json $(wildca
 	@touch $@
 apps/viewer/node_modules/.package-lock.json: apps/viewer/package-lock.json | packages
 	@command -v npm > /dev/null || scripts/install_packages.sh nodejs npm
-	@npm ci --prefix apps/viewer --ignore-scripts --no-audit --no-fund --omit=peer --silent
+	@npm ci --prefix apps/viewer --ignore-scripts --no-audit --no-fund --omit=peer --loglevel=error > /dev/null
 	@touch $@
 
 # What the page is tested in.
@@ -80,6 +114,14 @@ sanitize: packages
 	@cmake --preset debug --log-level=NOTICE > /dev/null
 	cmake --build --preset debug --parallel $(JOBS)
 	ctest --preset debug --parallel $(JOBS)
+
+# The same for what reads files, and maps: a few minutes.
+READERS = core_test config_test io_test store_test retrieval_test
+empty :=
+sanitize-readers: packages
+	@cmake --preset debug --log-level=NOTICE > /dev/null
+	cmake --build --preset debug --parallel $(JOBS) --target $(READERS)
+	ctest --preset debug --parallel $(JOBS) -L '^($(subst $(empty) ,|,$(READERS)))$$'
 
 SOURCES = $(shell git ls-files '*.cpp' '*.hpp' '*.h')
 lint: packages

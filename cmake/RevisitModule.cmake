@@ -35,16 +35,25 @@ function(revisit_test name)
   if(REVISIT_SANITIZE)
     set(longest_s 480)  # the slowest takes 53
   endif()
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT ${longest_s})
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT ${longest_s} LABELS ${name})
 endfunction()
 
 add_library(revisit_flags INTERFACE)
 target_compile_options(revisit_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
-  -Wno-restrict  # GCC 12 warns of its own std::string
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>  # GCC 12 warns of its own std::string
   # Nobody reads errno or flags of floating point: loops with roots and conditions become SIMD. No value changes.
   -fno-math-errno -fno-trapping-math)
 # Highway's target for processors that count bits in whole vectors (VPOPCNTDQ), the same for every file that chooses.
 target_compile_definitions(revisit_flags INTERFACE HWY_WANT_AVX3_DL)
+
+if(REVISIT_HARDENING AND NOT REVISIT_SANITIZE)
+  target_compile_options(revisit_flags INTERFACE -fstack-protector-strong -fstack-clash-protection
+    $<$<CONFIG:Release,RelWithDebInfo>:-U_FORTIFY_SOURCE> $<$<CONFIG:Release,RelWithDebInfo>:-D_FORTIFY_SOURCE=2>)
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+    target_compile_options(revisit_flags INTERFACE -fcf-protection)
+  endif()
+  target_link_options(revisit_flags INTERFACE -Wl,-z,relro,-z,now,-z,noexecstack)
+endif()
 if(REVISIT_SANITIZE)
   # Reads and writes through null pointers ASan sees too: checks of each use of a pointer take a fifth of the build.
   add_compile_options(-fsanitize=${REVISIT_SANITIZE} -fno-sanitize=null -fno-sanitize-recover=all)
