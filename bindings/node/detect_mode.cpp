@@ -16,9 +16,12 @@ class DetectMode final : public Mode {
     stamps_ns_[scan.frame] = moment.stamp_ns;
     auto detection = detector_.process(std::move(scan));
     if (!detection) return detection.error();
-    if (!detection->loop) return ok();
-    ++loops_;
-    outlet_.send(message_of(*detection->loop, moment, stamps_ns_.at(detection->loop->match)));
+    if (detection->loop) send(*detection->loop, moment);
+    for (const Detection& each : detection->earlier) {
+      Moment then = moment;
+      then.stamp_ns = stamps_ns_.at(each.frame);
+      send(*each.loop, then);
+    }
     return ok();
   }
   void set_verification(const Parameters& parameters) override { detector_.set_verification(parameters); }
@@ -27,6 +30,11 @@ class DetectMode final : public Mode {
   }
 
  private:
+  void send(const LoopConstraint& loop, const Moment& moment) {
+    ++loops_;
+    outlet_.send(message_of(loop, moment, stamps_ns_.at(loop.match)));
+  }
+
   Outlet& outlet_;
   LoopDetector detector_;
   std::map<FrameId, std::int64_t> stamps_ns_;

@@ -33,7 +33,8 @@ struct DetectOptions {
 
 void count(RunFile& run, const Detection& detection) {
   run.counts["queries_with_past"] += detection.searchable_places > 0;
-  run.counts["loops"] += detection.loop.has_value();
+  run.counts["loops"] += detection.loop.has_value() + detection.earlier.size();
+  run.counts["loops_found_later"] += detection.earlier.size();
   run.counts["registered"] += detection.geometric.has_value();
   run.counts["points"] += detection.points;
   run.counts["ground_points"] += detection.ground_points;
@@ -57,10 +58,16 @@ void skip(RunFile& run, Progress& progress, const Error& error) {
   run.skipped.push_back(error.message);
 }
 
-Status write_loop(ResultWriter& writer, const Detection& detection) {
+Status write_loops(ResultWriter& writer, const Detection& detection) {
   if (detection.searchable_places > 0)
     if (const Status status = writer.add(detection.row()); !status) return status;
-  return detection.loop ? writer.add(*detection.loop) : ok();
+  if (detection.loop)
+    if (const Status status = writer.add(*detection.loop); !status) return status;
+  for (const Detection& each : detection.earlier) {
+    writer.replace(each.row());
+    if (const Status status = writer.add(*each.loop); !status) return status;
+  }
+  return ok();
 }
 
 // The places of another recording.
@@ -100,8 +107,10 @@ Status detect_all(const Recording& recording, const DetectOne& detect_one, Resul
     } else {
       ++run.counts["scans"];
       count(run, *detection);
-      if (const Status status = write_loop(writer, *detection); !status) return status;
+      if (const Status status = write_loops(writer, *detection); !status) return status;
       if (const Status status = evidence.add(*detection); !status) return status;
+      for (const Detection& each : detection->earlier)
+        if (const Status status = evidence.add(each); !status) return status;
     }
     run.memory.after(i);
     progress.update(i + 1);

@@ -52,6 +52,8 @@ void bind_detection(py::module_& module) {
                              [](const Detection& self) -> std::optional<double> {
                                return self.geometric ? std::optional(self.geometric->probability) : std::nullopt;
                              })
+      .def_readonly("earlier", &Detection::earlier,
+                    "Scans of the last metres without a loop, to which one found since has led back: as they are now.")
       .def_property_readonly("milliseconds", &milliseconds, "By stage.");
 
   using Detector = Shared<LoopDetector>;

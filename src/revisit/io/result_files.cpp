@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <iomanip>
+#include <map>
+#include <sstream>
 
 #include <revisit/io/internal/bytes.hpp>
 #include <revisit/io/internal/text_writer.hpp>
@@ -60,10 +62,46 @@ Status read_csv(const fs::path& file, std::string_view header, ReadRow read_row)
   return ok();
 }
 
+void write(std::ostream& out, const CandidateRow& row) {
+  std::string reason = row.reason;
+  std::replace_if(
+      reason.begin(), reason.end(), [](char c) { return c == ',' || c == '\n' || c == '"'; }, ';');
+  out << row.query.value << ',';
+  if (row.match) out << row.match->value;
+  out << ',' << std::setprecision(6) << row.score << ',' << (row.accepted ? 1 : 0) << ',' << reason << '\n';
+}
+
+// The rows of a CSV file in the order of their queries, some of them replaced by others. The file is the one of before
+// or the new one, whatever happens.
+Status sort_rows(const fs::path& file, const std::map<FrameId, std::string>& replaced) {
+  const auto text = io_internal::read_bytes(file);
+  if (!text) return text.error();
+  const auto lines = io_internal::split_lines(*text);
+  std::vector<std::pair<FrameId, std::string_view>> rows;
+  for (std::size_t i = 1; i < lines.size(); ++i) {
+    const auto query = frame(split_cells(lines[i])[0]);
+    if (!query) continue;
+    const auto other = replaced.find(*query);
+    rows.emplace_back(*query, other == replaced.end() ? lines[i] : std::string_view(other->second));
+  }
+  std::stable_sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::string sorted = std::string(lines[0]) + '\n';
+  for (const auto& [query, row] : rows) (sorted += row) += '\n';
+  const fs::path partial = file.string() + ".part";
+  Status done = write_text(partial, sorted);
+  std::error_code failure;
+  if (done) fs::rename(partial, file, failure);
+  if (failure) done = Error{file.string() + ": cannot be replaced: " + failure.message()};
+  if (!done) fs::remove(partial, failure);
+  return done;
+}
+
 }  // namespace
 
 struct ResultWriter::Files {
+  fs::path folder;
   TextWriter candidates, loops;
+  std::map<FrameId, std::string> replaced;  // rows of candidates.csv, without their ends
 };
 
 ResultWriter::ResultWriter(std::unique_ptr<Files> files) : files_(std::move(files)) {}
@@ -83,7 +121,7 @@ Result<ResultWriter> ResultWriter::create(const fs::path& folder, Existing exist
                            "report.html", "precision_recall.png", "trajectory.png"})
     if (fs::is_regular_file(fs::symlink_status(folder / name, failure))) fs::remove(folder / name, failure);
   ResultWriter writer(
-      std::make_unique<Files>(Files{TextWriter(folder / "candidates.csv"), TextWriter(folder / "loops.csv")}));
+      std::make_unique<Files>(Files{folder, TextWriter(folder / "candidates.csv"), TextWriter(folder / "loops.csv"), {}}));
   writer.files_->candidates.stream() << kCandidateHeader << '\n';
   writer.files_->loops.stream() << kLoopHeader << '\n' << std::setprecision(10);
   for (TextWriter* each : {&writer.files_->candidates, &writer.files_->loops})
@@ -92,14 +130,14 @@ Result<ResultWriter> ResultWriter::create(const fs::path& folder, Existing exist
 }
 
 Status ResultWriter::add(const CandidateRow& row) {
-  auto& out = files_->candidates.stream();
-  std::string reason = row.reason;
-  std::replace_if(
-      reason.begin(), reason.end(), [](char c) { return c == ',' || c == '\n' || c == '"'; }, ';');
-  out << row.query.value << ',';
-  if (row.match) out << row.match->value;
-  out << ',' << std::setprecision(6) << row.score << ',' << (row.accepted ? 1 : 0) << ',' << reason << '\n';
+  write(files_->candidates.stream(), row);
   return files_->candidates.flush();
+}
+
+void ResultWriter::replace(const CandidateRow& row) {
+  std::ostringstream text;
+  write(text, row);
+  files_->replaced[row.query] = text.str().substr(0, text.str().size() - 1);
 }
 
 Status ResultWriter::add(const LoopConstraint& loop) {
@@ -117,7 +155,11 @@ Status ResultWriter::add(const LoopConstraint& loop) {
 Status ResultWriter::finish() {
   const Status candidates = files_->candidates.finish();
   const Status loops = files_->loops.finish();
-  return candidates ? loops : candidates;
+  for (const Status* each : {&candidates, &loops})
+    if (!*each) return *each;
+  if (files_->replaced.empty()) return ok();
+  const Status sorted = sort_rows(files_->folder / "candidates.csv", files_->replaced);
+  return sorted ? sort_rows(files_->folder / "loops.csv", {}) : sorted;
 }
 
 struct LocalisationWriter::File {

@@ -13,7 +13,7 @@
 namespace revisit {
 
 /// Writes candidates.csv and loops.csv row by row; each row is complete and with the system when `add` returns,
-/// so that nothing computed is lost. Not for several threads.
+/// so that nothing computed is lost. At the end, loops are in the order of their queries. Not for several threads.
 class ResultWriter {
  public:
   enum class Existing { kRefuse, kReplace };  ///< results of an earlier run in the folder
@@ -25,6 +25,8 @@ class ResultWriter {
 
   Status add(const CandidateRow& row);
   Status add(const LoopConstraint& loop);
+  /// What is known by now of a query whose row was added; finish() puts it in that row's place.
+  void replace(const CandidateRow& row);
   Status finish();
 
  private:

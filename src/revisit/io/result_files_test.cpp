@@ -58,6 +58,32 @@ TEST(ResultFiles, ExistingResultsAreKept) {
   EXPECT_TRUE(fs::exists(folder / "notes.txt"));
 }
 
+TEST(ResultFiles, WhatIsKnownLaterStandsInTheRowOfItsQuery) {
+  const fs::path folder = fresh_folder();
+  auto writer = ResultWriter::create(folder, ResultWriter::Existing::kReplace);
+  ASSERT_TRUE(writer) << writer.error().message;
+  for (const int query : {100, 101, 102}) {
+    ASSERT_TRUE(writer->add(CandidateRow{{query}, FrameId{7}, 0.5, query == 102, "not sure"}));
+    if (query == 102) {
+      ASSERT_TRUE(writer->add(LoopConstraint{{102}, {8}}));
+    }
+  }
+  writer->replace(CandidateRow{{101}, FrameId{9}, 1.5, true, ""});
+  ASSERT_TRUE(writer->add(LoopConstraint{{101}, {9}}));
+  EXPECT_EQ(read_candidates(folder / "candidates.csv")->at(1).match, FrameId{7}) << "until the end, as it was decided";
+  ASSERT_TRUE(writer->finish());
+  const auto rows = read_candidates(folder / "candidates.csv");
+  ASSERT_TRUE(rows && rows->size() == 3);
+  EXPECT_EQ((*rows)[0].reason, "not sure");
+  EXPECT_EQ((*rows)[1].query, FrameId{101});
+  EXPECT_EQ((*rows)[1].match, FrameId{9});
+  EXPECT_TRUE((*rows)[1].accepted);
+  const auto loops = read_loops(folder / "loops.csv");
+  ASSERT_TRUE(loops && loops->size() == 2);
+  EXPECT_EQ((*loops)[0].match, FrameId{9}) << "in the order of the queries";
+  EXPECT_EQ((*loops)[1].match, FrameId{8});
+}
+
 TEST(ResultFiles, AFullDiskIsNoticed) {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "needs /dev/full";
   const fs::path folder = fresh_folder();

@@ -32,6 +32,9 @@ struct Detection {
   double score = 0.0;                             ///< orders answers by confidence (docs/method.md, section 7)
   std::optional<Refusal> refusal;                 ///< why there is no loop; absent where there is one
   std::optional<Pose> T_match_query_by_odometry;  ///< for comparison, where both scans came with a pose
+  /// Scans of the last metres that had no loop when they came, and to which a loop found since has led back: what holds
+  /// of them now, each with its loop (LoopDetector::process).
+  std::vector<Detection> earlier;
 
   std::size_t points = 0, ground_points = 0;
   RingSource rings = RingSource::kNone;

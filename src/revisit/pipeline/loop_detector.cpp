@@ -21,18 +21,21 @@ Result<Detection> LoopDetector::process(Scan scan, const std::optional<Pose>& T_
   auto detection = recognition_.find(query, places, front_end_.typical().recent());
   if (!detection) return detection.error();
   detection->odometry_ms = prepared->odometry_ms;
-  if (detection->answer && T_world_lidar)
-    if (const auto T_world_match = T_world_places_.find(detection->answer->match);
-        T_world_match != T_world_places_.end())
-      detection->T_match_query_by_odometry = T_world_match->second.inverse() * *T_world_lidar;
-  if (const Status status = remember(std::move(query), T_world_lidar); !status) return status.error();
+  auto earlier = recognition_.follow_back(*detection, query.trajectory_point, front_end_.typical().recent());
+  if (!earlier) return earlier.error();
+  detection->earlier = *std::move(earlier);
+  if (T_world_lidar) T_world_scans_[query.scan.frame] = *T_world_lidar;
+  set_pose_by_odometry(*detection);
+  for (Detection& each : detection->earlier) set_pose_by_odometry(each);
+  if (const Status status = recognition_.add(std::move(query)); !status) return status.error();
   return detection;
 }
 
 Status LoopDetector::add(Scan scan, const std::optional<Pose>& T_world_lidar) {
   auto prepared = follow(std::move(scan));
   if (!prepared) return prepared.error();
-  return remember(std::move(prepared->scan), T_world_lidar);
+  if (T_world_lidar) T_world_scans_[prepared->scan.scan.frame] = *T_world_lidar;
+  return recognition_.add(std::move(prepared->scan));
 }
 
 Result<Detection> LoopDetector::localise(Scan scan) {
@@ -48,9 +51,11 @@ Result<DetectionFrontEnd::Step> LoopDetector::follow(Scan scan) {
   return front_end_.step(std::move(scan));
 }
 
-Status LoopDetector::remember(PreparedScan prepared, const std::optional<Pose>& T_world_lidar) {
-  if (T_world_lidar) T_world_places_[prepared.scan.frame] = *T_world_lidar;
-  return recognition_.add(std::move(prepared));
+void LoopDetector::set_pose_by_odometry(Detection& detection) const {
+  if (!detection.answer) return;
+  const auto query = T_world_scans_.find(detection.frame), match = T_world_scans_.find(detection.answer->match);
+  if (query == T_world_scans_.end() || match == T_world_scans_.end()) return;
+  detection.T_match_query_by_odometry = match->second.inverse() * query->second;
 }
 
 }  // namespace revisit

@@ -23,6 +23,7 @@ class LoopDetector {
 
   /// Looks for the scan's place among those old enough (exclusion of the recent past), then adds it.
   /// `T_world_lidar`, if there is one, is recorded as evidence and never used to decide.
+  /// A loop also leads back to scans of the last metres that had none when they came (Detection::earlier).
   /// An error says why this scan describes no place; the detector goes on with the next.
   Result<Detection> process(Scan scan, const std::optional<Pose>& T_world_lidar = std::nullopt);
 
@@ -39,11 +40,11 @@ class LoopDetector {
 
  private:
   Result<DetectionFrontEnd::Step> follow(Scan scan);
-  Status remember(PreparedScan prepared, const std::optional<Pose>& T_world_lidar);
+  void set_pose_by_odometry(Detection& detection) const;
 
   DetectionFrontEnd front_end_;
   PlaceRecognition recognition_;
-  std::map<FrameId, Pose> T_world_places_;  ///< of places that came with a pose
+  std::map<FrameId, Pose> T_world_scans_;  ///< of scans that came with a pose
 };
 
 }  // namespace revisit

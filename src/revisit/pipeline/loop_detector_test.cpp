@@ -108,6 +108,40 @@ TEST(LoopDetector, ALoopIsFollowedPastWhatStandsInTheWay) {
   EXPECT_FALSE(run(false, 0).loop) << "nor where loops are not followed";
 }
 
+// The first whole scan says where those before it stood.
+TEST(LoopDetector, ALoopLeadsBackToScansThatHadNone) {
+  const SyntheticWorld world(51);
+  const auto at = [](int i) { return SyntheticWorld::at(-6.0 + i, 0, 0); };
+  Parameters parameters;
+  parameters.geometric.min_probability = 0.9999999;
+  LoopDetector detector{parameters};
+  for (int i = 0; i < 8; ++i) ASSERT_TRUE(detector.process(scan_at(world, i, at(i), static_cast<unsigned>(i)), at(i)));
+  const auto come = [&](int i, bool is_blocked) {
+    Scan scan = scan_at(world, 1000 + i, at(i), 100U + static_cast<unsigned>(i));
+    auto detection = detector.process(is_blocked ? blocked(std::move(scan), 140.0) : std::move(scan), at(i));
+    EXPECT_TRUE(detection);
+    return *std::move(detection);
+  };
+  for (const int i : {1, 2, 3}) EXPECT_FALSE(come(i, true).loop) << i;
+  std::vector<Detection> earlier;
+  for (const int i : {4, 5}) {
+    Detection detection = come(i, false);
+    EXPECT_TRUE(detection.loop) << i << ": " << detection.reason();
+    for (Detection& each : detection.earlier) earlier.push_back(std::move(each));
+  }
+  ASSERT_EQ(earlier.size(), 3u);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const int i = 3 - static_cast<int>(k);
+    ASSERT_TRUE(earlier[k].loop);
+    EXPECT_EQ(earlier[k].frame, FrameId{1000 + i}) << "the newest first, two a scan";
+    EXPECT_EQ(earlier[k].loop->match, FrameId{i});
+    EXPECT_LT(earlier[k].loop->T_match_query.translation().norm(), 0.1);
+    EXPECT_TRUE(earlier[k].row().accepted);
+    ASSERT_TRUE(earlier[k].T_match_query_by_odometry);
+    EXPECT_LT(earlier[k].T_match_query_by_odometry->translation().norm(), 1e-9);
+  }
+}
+
 TEST(LoopDetector, OfAFarAnswerAndAMuchNearerPlaceBothCount) {
   const SyntheticWorld world(51);
   const auto run = [&](bool fits_nearby) {

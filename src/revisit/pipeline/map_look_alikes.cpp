@@ -48,7 +48,7 @@ Result<double> PlaceRecognition::learn_look_alikes_of_map(const std::function<Tr
     if (found->empty()) continue;
 
     const VerificationQuery question{frame, descriptor, **cloud, nullptr, std::nullopt};
-    const VerificationContext context = this->context(typical);
+    const VerificationContext context = this->context(typical, following_);
     CandidateRegistration registration(context, question);
     const auto tested = registration.test(*found);
     if (!tested) return tested.error();

@@ -53,7 +53,8 @@ Result<std::vector<LoopCandidate>> PlaceRecognition::candidates(const PreparedSc
   return candidates;
 }
 
-VerificationContext PlaceRecognition::context(const TypicalAgreement& typical) const {
+VerificationContext PlaceRecognition::context(const TypicalAgreement& typical, const LoopFollowing& following,
+                                              FrameId newest) const {
   return {.parameters = parameters_,
           .clouds = *clouds_,
           .geometries = geometries_,
@@ -65,16 +66,16 @@ VerificationContext PlaceRecognition::context(const TypicalAgreement& typical) c
           },
           .place_descriptor = [this](FrameId frame) { return index_.find(frame); },
           .places = points_,
-          .following = following_,
+          .following = following,
           .typical = typical,
           .look_alikes_log_odds = look_alikes_log_odds(),
-          .newest = {}};
+          .newest = newest};
 }
 
 Result<Hypothesis> PlaceRecognition::test(const PreparedScan& query, const PosePrediction& prediction,
                                           const TypicalAgreement& typical) {
   const VerificationQuery question{query.scan.frame, query.descriptor, query.cloud, query.geometry, std::nullopt};
-  const VerificationContext context = this->context(typical);
+  const VerificationContext context = this->context(typical, following_);
   CandidateRegistration registration(context, question);
   auto hypothesis = registration.test(prediction);
   if (hypothesis && hypothesis->geometric)
@@ -95,8 +96,9 @@ Status PlaceRecognition::verify(const PreparedScan& query, const TypicalAgreemen
   Stopwatch watch;
   const VerificationQuery question{query.scan.frame, query.descriptor, query.cloud, query.geometry,
                                    query.trajectory_point};
-  VerificationContext context = this->context(typical);
-  context.newest = detection.candidates.empty() ? FrameId{} : index_.frame(detection.searchable_places - 1);
+  const VerificationContext context =
+      this->context(typical, following_,
+                    detection.candidates.empty() ? FrameId{} : index_.frame(detection.searchable_places - 1));
   LoopVerification verification(context, question);
   if (queries_++ % kLearnsEvery == 0 && parameters_.geometric.overhead_search)
     if (const Status status = learn_look_alikes(query, verification.registration()); !status) return status;
@@ -105,7 +107,12 @@ Status PlaceRecognition::verify(const PreparedScan& query, const TypicalAgreemen
   if (!answer) return answer.error();
   for (const Hypothesis& each : verification.hypotheses())
     if (each.geometric) detection.registered.push_back({each.candidate.match, *each.geometric});
-  if (*answer) accept(query, **answer, verification.registration().query_geometry(), detection);
+  if (*answer) {
+    this->answer(*std::move(*answer), verification.registration().query_geometry(), detection);
+    if (is_to_be_followed(detection, query.trajectory_point))
+      following_.add(*query.trajectory_point, detection.loop->match, *points_.at(detection.loop->match),
+                     detection.loop->T_match_query, detection.geometric->log_odds);
+  }
   detection.temporal_ms = verification.registration().temporal_ms();
   detection.geometric_ms = watch.lap_ms();
   return ok();
@@ -132,25 +139,25 @@ Status PlaceRecognition::learn_look_alikes(const PreparedScan& query, CandidateR
   return ok();
 }
 
-void PlaceRecognition::accept(const PreparedScan& query, Hypothesis& answer, const ScanGeometry& query_geometry,
-                              Detection& detection) {
-  detection.score = answer.score();
-  if (answer.is_accepted()) {
-    const auto& place = points_.at(answer.candidate.match);
-    // Its own evidence must speak for it: where nothing is to be seen, a robot is not followed for ever.
-    if (parameters_.geometric.follow && query.trajectory_point && place && answer.own_log_odds() > 0.0)
-      following_.add(*query.trajectory_point, answer.candidate.match, *place, answer.geometric->T_match_query,
-                     answer.geometric->log_odds);
-    refine(*answer.geometric, *answer.geometry, query_geometry);
-    const GeometricEvidence& found = *answer.geometric;
-    detection.loop =
-        LoopConstraint{detection.frame,       answer.candidate.match, found.T_match_query, found.evidence.inlier_ratio,
-                       found.evidence.rmse_m, found.probability,      detection.score,     found.information};
+// Its own evidence must speak for it: where nothing is to be seen, a robot is not followed for ever.
+bool PlaceRecognition::is_to_be_followed(const Detection& detection, const std::optional<TrajectoryPoint>& point) const {
+  return parameters_.geometric.follow && detection.loop && point && points_.at(detection.loop->match) &&
+         detection.geometric->own_log_odds > 0.0;
+}
+
+void PlaceRecognition::answer(Hypothesis hypothesis, const ScanGeometry& query_geometry, Detection& detection) {
+  detection.score = hypothesis.score();
+  if (hypothesis.is_accepted()) {
+    refine(*hypothesis.geometric, *hypothesis.geometry, query_geometry);
+    const GeometricEvidence& found = *hypothesis.geometric;
+    detection.loop = LoopConstraint{detection.frame,       hypothesis.candidate.match, found.T_match_query,
+                                    found.evidence.inlier_ratio, found.evidence.rmse_m,      found.probability,
+                                    detection.score,       found.information};
   }
-  detection.answer = answer.candidate;
-  detection.temporal = answer.temporal;
-  detection.refusal = answer.refusal;
-  detection.geometric = answer.geometric;
+  detection.answer = hypothesis.candidate;
+  detection.temporal = hypothesis.temporal;
+  detection.refusal = hypothesis.refusal;
+  detection.geometric = std::move(hypothesis.geometric);
 }
 
 Status PlaceRecognition::add(PreparedScan place) {

@@ -11,6 +11,7 @@
 
 #include <revisit/pipeline/detection.hpp>
 #include <revisit/retrieval/place_index.hpp>
+#include <revisit/verification/backward_following.hpp>
 #include <revisit/verification/candidate_registration.hpp>
 #include <revisit/verification/hypothesis.hpp>
 #include <revisit/verification/look_alikes.hpp>
@@ -31,6 +32,10 @@ class PlaceRecognition {
 
   /// Looks for the scan among the first `places` of the index. An error where a place cannot be read.
   Result<Detection> find(const PreparedScan& query, std::size_t places, const TypicalAgreement& typical);
+  /// Follows loops backwards, two scans a call: those of the last metres that had none when they came, and have one now
+  /// (BackwardFollowing). `detection`: what find() said of the newest scan, at this point of the trajectory.
+  Result<std::vector<Detection>> follow_back(const Detection& detection, const std::optional<TrajectoryPoint>& point,
+                                             const TypicalAgreement& typical);
   /// The scan registered near to where it is predicted to stand, and nowhere else.
   Result<Hypothesis> test(const PreparedScan& query, const PosePrediction& prediction, const TypicalAgreement& typical);
   /// How much alike the places of a finished map are: some of them are looked for among those that are elsewhere.
@@ -75,11 +80,14 @@ class PlaceRecognition {
   void set_look_alikes(double log_odds) { look_alikes_of_map_ = log_odds; }
 
  private:
-  VerificationContext context(const TypicalAgreement& typical) const;
+  VerificationContext context(const TypicalAgreement& typical, const LoopFollowing& following,
+                              FrameId newest = {}) const;
   Result<std::vector<LoopCandidate>> candidates(const PreparedScan& query, std::size_t places) const;
   Status verify(const PreparedScan& query, const TypicalAgreement& typical, Detection& detection);
   Status learn_look_alikes(const PreparedScan& query, CandidateRegistration& registration);
-  void accept(const PreparedScan& query, Hypothesis& answer, const ScanGeometry& query_geometry, Detection& detection);
+  Result<std::optional<Detection>> find_again(const BackwardFollowing::Query& query, const TypicalAgreement& typical);
+  bool is_to_be_followed(const Detection& detection, const std::optional<TrajectoryPoint>& point) const;
+  static void answer(Hypothesis hypothesis, const ScanGeometry& query_geometry, Detection& detection);
 
   Parameters parameters_;
   PlaceIndex index_;
@@ -88,6 +96,7 @@ class PlaceRecognition {
   mutable PlaceGeometries geometries_;
   TrajectoryPoints points_;  ///< of all places
   LoopFollowing following_;
+  BackwardFollowing backward_;  ///< of LoopDetector alone; Slam and its --resume do without
   LookAlikes look_alikes_;
   std::optional<double> look_alikes_of_map_;
   std::size_t queries_ = 0;

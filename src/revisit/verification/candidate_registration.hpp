@@ -15,10 +15,17 @@
 
 namespace revisit {
 
+/// A pose of a query relative to a place that was registered, and its log odds with the prior.
+struct RegisteredPose {
+  FrameId match;
+  Pose T_match_query = Pose::Identity();
+  double log_odds = 0.0;
+};
+
 /// A scan whose place is searched.
 struct VerificationQuery {
   FrameId frame;
-  const IntensityScanContext& descriptor;
+  DescriptorView descriptor;
   const ThinCloud& cloud;
   std::shared_ptr<const ScanGeometry> geometry;  ///< of the cloud, where it was made already
   std::optional<TrajectoryPoint> trajectory_point;

@@ -51,6 +51,23 @@ Result<std::optional<Hypothesis>> LoopVerification::verify(std::span<const LoopC
   return best;
 }
 
+Result<std::optional<Hypothesis>> LoopVerification::verify_again(std::span<const RegisteredPose> registered) {
+  auto predicted = test_predicted_place();
+  if (!predicted || !*predicted) return predicted;
+  hypotheses_.push_back(*std::move(*predicted));
+  for (const RegisteredPose& each : registered) {
+    Hypothesis& other = hypotheses_.emplace_back();
+    other.candidate.match = each.match;
+    other.geometric.emplace();
+    other.geometric->T_match_query = each.T_match_query;
+    other.geometric->log_odds = each.log_odds;
+    other.refusal = Refusal{Refusal::Reason::kImprobable};  // as it was then
+  }
+  weigh_against_each_other();
+  hypotheses_.resize(1);
+  return std::optional<Hypothesis>(hypotheses_.front());
+}
+
 // Places that are alike call for caution (LookAlikes). Of a scan alone in a finished map, those that look most like it
 // have been registered, too: the caution is for them, and a pose that fits far better than any other needs less of it.
 void LoopVerification::trust_what_stands_out() {

@@ -18,6 +18,9 @@ class LoopVerification {
 
   /// The best hypothesis, accepted or not; none where there are no candidates. An error where a place cannot be read.
   Result<std::optional<Hypothesis>> verify(std::span<const LoopCandidate> candidates);
+  /// The same for a query that was refused when it came, and that a later loop leads back to (BackwardFollowing): the
+  /// place predicted is tested, against the poses that were registered then. None where no loop reaches it.
+  Result<std::optional<Hypothesis>> verify_again(std::span<const RegisteredPose> registered);
   /// Everything that was tested.
   const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
   CandidateRegistration& registration() { return registration_; }

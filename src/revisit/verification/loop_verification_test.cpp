@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/verification/loop_verification.hpp>
 
+#include <utility>
+
 #include <gtest/gtest.h>
 
 #include <revisit/descriptors/similarity.hpp>
@@ -128,6 +130,30 @@ TEST_F(LoopVerificationTest, OfAFarAnswerAndANearerPlaceTheNearerOneIsTested) {
   ASSERT_TRUE(answer && *answer);
   EXPECT_EQ((*answer)->candidate.match, FrameId{5}) << "odometry connects the places: 5 is 4 m nearer";
   EXPECT_LT((*answer)->distance_m(), 0.1);
+}
+
+TEST_F(LoopVerificationTest, ALaterLoopLeadsBackUnlessAnotherPoseWasAsSure) {
+  const TrajectoryPoint now{.segment = 7}, later = now.after(planar_pose(1, 0, 0));
+  following_.add(later, FrameId{4}, *points_.at(FrameId{4}), planar_pose(0, 0.1, 0), 12.0);
+  const Described query = described(home_, SyntheticWorld::at(3.0, 0.1, 0));
+  const VerificationQuery question{FrameId{1001}, query.descriptor, query.cloud, nullptr, now};
+  const VerificationContext known = context();
+  LoopVerification verification(known, question);
+  const auto answer = verification.verify_again({});
+  ASSERT_TRUE(answer && *answer);
+  EXPECT_TRUE((*answer)->is_accepted());
+  EXPECT_EQ((*answer)->candidate.match, FrameId{3});
+  // The same pose, found from another place, is no other; one 4 m away is.
+  for (const auto& [at_m, is_accepted] : {std::pair{2.0, true}, {-2.0, false}}) {
+    const RegisteredPose registered{FrameId{1}, planar_pose(at_m, 0.1, 0), (*answer)->geometric->log_odds};
+    LoopVerification against(known, question);
+    const auto doubted = against.verify_again({&registered, 1});
+    ASSERT_TRUE(doubted && *doubted);
+    EXPECT_EQ((*doubted)->is_accepted(), is_accepted) << at_m;
+  }
+  const VerificationQuery lost{FrameId{1001}, query.descriptor, query.cloud, nullptr, TrajectoryPoint{.segment = 8}};
+  LoopVerification out_of_reach(known, lost);
+  EXPECT_FALSE(*out_of_reach.verify_again({}));
 }
 
 TEST_F(LoopVerificationTest, AFollowedLoopIsTestedFirstAndAlone) {
