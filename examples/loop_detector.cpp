@@ -13,9 +13,10 @@ int main(int, char** argv) {
     auto scan = (*recording)->read(i);
     if (!scan) continue;
     const auto detection = detector.process(*std::move(scan));
-    if (!detection || !detection->loop) continue;
-    const auto& loop = *detection->loop;
-    const Eigen::Vector3d t = loop.T_match_query.translation();
-    std::printf("%ld -> %ld: %.2f %.2f %.2f m\n", loop.query.value, loop.match.value, t.x(), t.y(), t.z());
+    if (!detection) continue;
+    for (const auto& loop : detection->loops()) {
+      const Eigen::Vector3d t = loop.T_match_query.translation();
+      std::printf("%ld -> %ld: %.2f %.2f %.2f m\n", loop.query.value, loop.match.value, t.x(), t.y(), t.z());
+    }
   }
 }

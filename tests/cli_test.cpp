@@ -328,8 +328,7 @@ TEST(Cli, CtrlCLeavesCompleteRows) {
   }
   const pid_t child = fork();
   if (child == 0) {
-    std::freopen("/dev/null", "w", stderr);
-    std::freopen("/dev/null", "w", stdout);
+    if (!std::freopen("/dev/null", "w", stderr) || !std::freopen("/dev/null", "w", stdout)) _exit(127);
     execl(REVISIT_PROGRAM, "revisit", "detect", recording.c_str(), "--out", out.c_str(), "--retrieval.exclude_frames",
           "2", "--retrieval.exclude_s", "0", static_cast<char*>(nullptr));
     _exit(127);

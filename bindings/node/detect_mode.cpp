@@ -16,11 +16,11 @@ class DetectMode final : public Mode {
     stamps_ns_[scan.frame] = moment.stamp_ns;
     auto detection = detector_.process(std::move(scan));
     if (!detection) return detection.error();
-    if (detection->loop) send(*detection->loop, moment);
-    for (const Detection& each : detection->earlier) {
+    for (const LoopConstraint& loop : detection->loops()) {
       Moment then = moment;
-      then.stamp_ns = stamps_ns_.at(each.frame);
-      send(*each.loop, then);
+      then.stamp_ns = stamps_ns_.at(loop.query);
+      ++loops_;
+      outlet_.send(message_of(loop, then, stamps_ns_.at(loop.match)));
     }
     return ok();
   }
@@ -30,11 +30,6 @@ class DetectMode final : public Mode {
   }
 
  private:
-  void send(const LoopConstraint& loop, const Moment& moment) {
-    ++loops_;
-    outlet_.send(message_of(loop, moment, stamps_ns_.at(loop.match)));
-  }
-
   Outlet& outlet_;
   LoopDetector detector_;
   std::map<FrameId, std::int64_t> stamps_ns_;

@@ -33,7 +33,7 @@ struct DetectOptions {
 
 void count(RunFile& run, const Detection& detection) {
   run.counts["queries_with_past"] += detection.searchable_places > 0;
-  run.counts["loops"] += detection.loop.has_value() + detection.earlier.size();
+  run.counts["loops"] += detection.loops().size();
   run.counts["loops_found_later"] += detection.earlier.size();
   run.counts["registered"] += detection.geometric.has_value();
   run.counts["points"] += detection.points;
@@ -61,12 +61,9 @@ void skip(RunFile& run, Progress& progress, const Error& error) {
 Status write_loops(ResultWriter& writer, const Detection& detection) {
   if (detection.searchable_places > 0)
     if (const Status status = writer.add(detection.row()); !status) return status;
-  if (detection.loop)
-    if (const Status status = writer.add(*detection.loop); !status) return status;
-  for (const Detection& each : detection.earlier) {
-    writer.replace(each.row());
-    if (const Status status = writer.add(*each.loop); !status) return status;
-  }
+  for (const LoopConstraint& loop : detection.loops())
+    if (const Status status = writer.add(loop); !status) return status;
+  for (const Detection& each : detection.earlier) writer.replace(each.row());
   return ok();
 }
 

@@ -4,7 +4,7 @@
     import revisit
     recording = revisit.open_recording("drive.bag")
     detector = revisit.LoopDetector(recording=recording)
-    loops = [d.loop for d in map(detector.process, recording) if d.loop]
+    loops = [loop for scan in recording for loop in detector.process(scan).loops]
 
 Points are arrays N x 3 or N x 4 (x forward, y left, z up, metres; raw intensity), poses 4 x 4 arrays that map the frame
 named last into the one named first (`T_match_query`). Messages go to `logging`, logger "revisit".
@@ -180,7 +180,7 @@ def _progress(iterable, show, **arguments):
 
 
 def detect(recording, parameters=None, *, progress=True):
-    """The loops of a recording (or of what open_recording() takes): a list of Loop. Scans that describe no place are
+    """The loops of a recording (or of what open_recording() takes): a list of Loop, by query. Scans that describe no place are
     left out and logged."""
     import logging
     if not isinstance(recording, Recording):
@@ -193,9 +193,8 @@ def detect(recording, parameters=None, *, progress=True):
         except Error as error:
             logging.getLogger("revisit").warning("scan left out: %s", error)
             continue
-        if detection.loop:
-            loops.append(detection.loop)
-    return loops
+        loops += detection.loops
+    return sorted(loops, key=lambda loop: loop.query)
 
 
 def register_scans(source, target, parameters=None):

@@ -17,6 +17,14 @@ std::string Detection::reason() const {
   return text;
 }
 
+std::vector<LoopConstraint> Detection::loops() const {
+  std::vector<LoopConstraint> loops;
+  if (loop) loops.push_back(*loop);
+  for (const Detection& each : earlier)
+    if (each.loop) loops.push_back(*each.loop);
+  return loops;
+}
+
 CandidateRow Detection::row() const {
   CandidateRow row;
   row.query = frame;

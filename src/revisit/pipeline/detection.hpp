@@ -43,6 +43,8 @@ struct Detection {
 
   /// The refusal in words, with the evidence behind it; empty where there is a loop.
   std::string reason() const;
+  /// All that were found with this scan: its own, and those of earlier scans.
+  std::vector<LoopConstraint> loops() const;
   CandidateRow row() const;
 };
 
