@@ -52,7 +52,8 @@ void bind_detection(py::module_& module) {
                              [](const Detection& self) -> std::optional<double> {
                                return self.geometric ? std::optional(self.geometric->probability) : std::nullopt;
                              })
-      .def_property_readonly("loops", &Detection::loops, "All found with this scan: its own, and those of earlier scans.")
+      .def_property_readonly("loops", &Detection::loops,
+                             "All found with this scan: its own, and those of earlier scans.")
       .def_readonly("earlier", &Detection::earlier,
                     "Scans of the last metres without a loop, to which one found since has led back: as they are now.")
       .def_property_readonly("milliseconds", &milliseconds, "By stage.");

@@ -120,8 +120,8 @@ Result<ResultWriter> ResultWriter::create(const fs::path& folder, Existing exist
                            "calib.txt", "run.json", "evaluation.json", "reference.txt", "trajectories.png", "map.png",
                            "report.html", "precision_recall.png", "trajectory.png"})
     if (fs::is_regular_file(fs::symlink_status(folder / name, failure))) fs::remove(folder / name, failure);
-  ResultWriter writer(
-      std::make_unique<Files>(Files{folder, TextWriter(folder / "candidates.csv"), TextWriter(folder / "loops.csv"), {}}));
+  ResultWriter writer(std::make_unique<Files>(
+      Files{folder, TextWriter(folder / "candidates.csv"), TextWriter(folder / "loops.csv"), {}}));
   writer.files_->candidates.stream() << kCandidateHeader << '\n';
   writer.files_->loops.stream() << kLoopHeader << '\n' << std::setprecision(10);
   for (TextWriter* each : {&writer.files_->candidates, &writer.files_->loops})

@@ -25,16 +25,31 @@ Result<DetectionFrontEnd::Step> DetectionFrontEnd::step(Scan scan) {
   const OdometryStep step = odometry_.follow(scan);
   const double odometry_ms = watch.lap_ms();
   if (step.up) scan.up = step.up;
+  auto previous = compensated_previous(step);
+  awaits_motion_ = !step.motion && !scan.times_s.empty() ? std::optional(scan) : std::nullopt;
   auto prepared = preparation_.prepare(std::move(scan), step.motion);
   if (!prepared) {
     previous_.reset();
+    awaits_motion_.reset();
     point_ = {.segment = point_.segment + 1, .origin = ++origins_};
     return prepared.error();
   }
   prepared->geometry = std::make_shared<ScanGeometry>(prepared->cloud);
   prepared->trajectory_point = point_ = next_point(step, *prepared);
   previous_ = prepared->geometry;
-  return Step{*std::move(prepared), odometry_ms};
+  return Step{*std::move(prepared), odometry_ms, awaits_motion_.has_value(), std::move(previous)};
+}
+
+// The first scan of a drive, and the first after a loss of track: the motion to the next one was that of its sweep,
+// too.
+std::optional<PreparedScan> DetectionFrontEnd::compensated_previous(const OdometryStep& step) {
+  auto scan = std::exchange(awaits_motion_, std::nullopt);
+  if (!scan || !step.is_connected || !step.motion) return std::nullopt;
+  auto prepared = preparation_.prepare(*std::move(scan), step.motion);
+  if (!prepared) return std::nullopt;
+  prepared->geometry = previous_ = std::make_shared<ScanGeometry>(prepared->cloud);
+  prepared->trajectory_point = point_;
+  return *std::move(prepared);
 }
 
 // On the segment of the scan before, where odometry is sure of the motion and the scans themselves confirm it.

@@ -21,6 +21,8 @@ class DetectionFrontEnd {
   struct Step {
     PreparedScan scan;  ///< with its geometry and trajectory point
     double odometry_ms = 0.0;
+    bool awaits_motion = false;            ///< it was swept, and how the sensor moved is known with the next scan only
+    std::optional<PreparedScan> previous;  ///< the scan before, if it did: with its sweep compensated
   };
   /// An error says why the scan describes no place; the next one may.
   Result<Step> step(Scan scan);
@@ -31,6 +33,7 @@ class DetectionFrontEnd {
 
  private:
   TrajectoryPoint next_point(const OdometryStep& step, PreparedScan& prepared);
+  std::optional<PreparedScan> compensated_previous(const OdometryStep& step);
 
   Parameters parameters_;
   Odometry odometry_;
@@ -43,6 +46,7 @@ class DetectionFrontEnd {
     Pose T_odom_lidar = Pose::Identity();
   };
   std::optional<Tracked> tracked_;                ///< the last scan that odometry tracked
+  std::optional<Scan> awaits_motion_;             ///< the last scan, where its sweep could not be compensated
   int origins_ = 0;                               ///< of trajectory points, so far
   std::shared_ptr<const ScanGeometry> previous_;  ///< likewise; null where it described no place
 };

@@ -27,7 +27,9 @@ Result<Detection> LoopDetector::process(Scan scan, const std::optional<Pose>& T_
   if (T_world_lidar) T_world_scans_[query.scan.frame] = *T_world_lidar;
   set_pose_by_odometry(*detection);
   for (Detection& each : detection->earlier) set_pose_by_odometry(each);
-  if (const Status status = recognition_.add(std::move(query)); !status) return status.error();
+  waiting_ = std::move(query);
+  if (!prepared->awaits_motion)
+    if (const Status status = add_waiting(); !status) return status.error();
   return detection;
 }
 
@@ -39,16 +41,28 @@ Status LoopDetector::add(Scan scan, const std::optional<Pose>& T_world_lidar) {
 }
 
 Result<Detection> LoopDetector::localise(Scan scan) {
+  if (const Status status = add_waiting(); !status) return status.error();
   const auto prepared = front_end_.prepare(std::move(scan));
   if (!prepared) return prepared.error();
   return recognition_.find(*prepared, index().size(), front_end_.typical().overall());
 }
 
 Result<DetectionFrontEnd::Step> LoopDetector::follow(Scan scan) {
-  if (const std::size_t places = index().size(); places > 0 && scan.frame <= index().frame(places - 1))
-    throw std::invalid_argument(to_text(scan.frame) + " after " + to_text(index().frame(places - 1)) +
-                                "; allowed: increasing frames");
-  return front_end_.step(std::move(scan));
+  const std::size_t places = index().size();
+  if (const auto last = waiting_     ? std::optional(waiting_->scan.frame)
+                        : places > 0 ? std::optional(index().frame(places - 1))
+                                     : std::nullopt;
+      last && scan.frame <= *last)
+    throw std::invalid_argument(to_text(scan.frame) + " after " + to_text(*last) + "; allowed: increasing frames");
+  auto step = front_end_.step(std::move(scan));
+  if (step && step->previous) waiting_ = *std::exchange(step->previous, std::nullopt);
+  if (const Status status = add_waiting(); !status) return status.error();
+  return step;
+}
+
+Status LoopDetector::add_waiting() {
+  if (!waiting_) return ok();
+  return recognition_.add(*std::exchange(waiting_, std::nullopt));
 }
 
 void LoopDetector::set_pose_by_odometry(Detection& detection) const {

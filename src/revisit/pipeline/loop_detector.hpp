@@ -40,10 +40,12 @@ class LoopDetector {
 
  private:
   Result<DetectionFrontEnd::Step> follow(Scan scan);
+  Status add_waiting();
   void set_pose_by_odometry(Detection& detection) const;
 
   DetectionFrontEnd front_end_;
   PlaceRecognition recognition_;
+  std::optional<PreparedScan> waiting_;    ///< the last scan, where the next one shows how its sweep is compensated
   std::map<FrameId, Pose> T_world_scans_;  ///< of scans that came with a pose
 };
 

@@ -108,6 +108,28 @@ TEST(LoopDetector, ALoopIsFollowedPastWhatStandsInTheWay) {
   EXPECT_FALSE(run(false, 0).loop) << "nor where loops are not followed";
 }
 
+// Swept at 10 m/s: of the first scan nobody knows how it moved until the second comes.
+TEST(LoopDetector, TheFirstPlaceOfADriveIsCompensatedWithTheMotionOfTheSecondScan) {
+  const SyntheticWorld world(51);
+  const auto at = [](double x) { return SyntheticWorld::at(x, 0, 0); };
+  // Every point as its own moment showed it: the sensor turns once in a tenth of a second, the stamp is in the middle.
+  const auto swept = [&](int frame, double x) {
+    Scan scan = scan_at(world, frame, at(x), static_cast<unsigned>(frame));
+    for (const Point& p : scan.points)
+      scan.times_s.push_back(static_cast<float>(0.1 * std::atan2(p.y, p.x) / (2.0 * kPi)));
+    for (std::size_t i = 0; i < scan.points.size(); ++i) scan.points[i].x -= 10.f * scan.times_s[i];
+    return scan;
+  };
+  LoopDetector detector{Parameters{}};
+  for (int i = 0; i < 4; ++i) ASSERT_TRUE(detector.process(swept(i, -6.0 + i)));
+  EXPECT_EQ(detector.index().size(), 4u);
+  const Pose T_query = SyntheticWorld::at(-6.0, 0, kPi / 2.0);  // turned: another part is swept first
+  const auto found = detector.process(scan_at(world, 1000, T_query, 99));
+  ASSERT_TRUE(found && found->loop) << found->reason();
+  EXPECT_EQ(found->loop->match, FrameId{0});
+  EXPECT_LT(found->loop->T_match_query.translation().norm(), 0.02);
+}
+
 // The first whole scan says where those before it stood.
 TEST(LoopDetector, ALoopLeadsBackToScansThatHadNone) {
   const SyntheticWorld world(51);

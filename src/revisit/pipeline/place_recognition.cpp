@@ -96,9 +96,8 @@ Status PlaceRecognition::verify(const PreparedScan& query, const TypicalAgreemen
   Stopwatch watch;
   const VerificationQuery question{query.scan.frame, query.descriptor, query.cloud, query.geometry,
                                    query.trajectory_point};
-  const VerificationContext context =
-      this->context(typical, following_,
-                    detection.candidates.empty() ? FrameId{} : index_.frame(detection.searchable_places - 1));
+  const VerificationContext context = this->context(
+      typical, following_, detection.candidates.empty() ? FrameId{} : index_.frame(detection.searchable_places - 1));
   LoopVerification verification(context, question);
   if (queries_++ % kLearnsEvery == 0 && parameters_.geometric.overhead_search)
     if (const Status status = learn_look_alikes(query, verification.registration()); !status) return status;
@@ -140,7 +139,8 @@ Status PlaceRecognition::learn_look_alikes(const PreparedScan& query, CandidateR
 }
 
 // Its own evidence must speak for it: where nothing is to be seen, a robot is not followed for ever.
-bool PlaceRecognition::is_to_be_followed(const Detection& detection, const std::optional<TrajectoryPoint>& point) const {
+bool PlaceRecognition::is_to_be_followed(const Detection& detection,
+                                         const std::optional<TrajectoryPoint>& point) const {
   return parameters_.geometric.follow && detection.loop && point && points_.at(detection.loop->match) &&
          detection.geometric->own_log_odds > 0.0;
 }
@@ -150,9 +150,9 @@ void PlaceRecognition::answer(Hypothesis hypothesis, const ScanGeometry& query_g
   if (hypothesis.is_accepted()) {
     refine(*hypothesis.geometric, *hypothesis.geometry, query_geometry);
     const GeometricEvidence& found = *hypothesis.geometric;
-    detection.loop = LoopConstraint{detection.frame,       hypothesis.candidate.match, found.T_match_query,
-                                    found.evidence.inlier_ratio, found.evidence.rmse_m,      found.probability,
-                                    detection.score,       found.information};
+    detection.loop = LoopConstraint{
+        detection.frame,       hypothesis.candidate.match, found.T_match_query, found.evidence.inlier_ratio,
+        found.evidence.rmse_m, found.probability,          detection.score,     found.information};
   }
   detection.answer = hypothesis.candidate;
   detection.temporal = hypothesis.temporal;
