@@ -54,7 +54,7 @@ def _repr(self):
 
 for _kind, _names in {
         Loop: "query match T_match_query information probability score inlier_ratio rmse_m",
-        Detection: "frame loop reason searchable_places candidates score probability milliseconds",
+        Detection: "frame loop loops earlier reason searchable_places candidates score probability milliseconds",
         Registration: "T_target_source information probability inlier_ratio rmse_m is_accepted reason",
         SlamStep: "frame T_world_lidar is_tracked is_keyframe detection loops_entered",
         Localisation: "frame status T_map_lidar probability information match reason"}.items():

@@ -54,7 +54,7 @@ def scan(points, ax=None, range_m=50.0):
 
 def registration(source, target, T_target_source, ax=None, range_m=50.0):
     """Two scans laid on each other at the pose that was found."""
-    ax = _axes(ax)
+    ax, T_target_source = _axes(ax), np.asarray(T_target_source)
     source = np.asarray(getattr(source, "points", source))[:, :3] @ T_target_source[:3, :3].T + T_target_source[:3, 3]
     for points, colour, name in ((np.asarray(getattr(target, "points", target)), "#999999", "target"),
                                  (source, "#d55e00", "source")):
@@ -79,7 +79,7 @@ def descriptor(of, ax=None):
 
 def map(points, ax=None, most=300_000):
     """A map from above, coloured by height; at most so many of its points."""
-    ax = _axes(ax)
+    ax, points = _axes(ax), np.asarray(points)
     points = points[:: max(1, len(points) // most)]
     low, high = np.percentile(points[:, 2], [2, 98]) if len(points) else (0, 1)
     order = np.argsort(points[:, 2])

@@ -21,18 +21,26 @@ def test_five_lines_find_the_loop_of_kitti(shared):
     assert (4501, 52) in [(loop.query, loop.match) for loop in loops]
 
 
-def test_the_loops_are_those_of_the_program(drive, short_past, tmp_path):
+def test_the_loops_are_those_of_the_program(short_past, tmp_path):
     settings = tmp_path / "drive.toml"
-    settings.write_text('[simulation]\nworld = "warehouse"\nsensor = "vlp16"\nseed = 5\nframes = 150\n')
+    settings.write_text('[simulation]\nworld = "warehouse"\nsensor = "vlp16"\nseed = 7\nframes = 150\ndifficulty = 1\n')
     revisit.run("detect", settings, "--out", tmp_path / "out", "--retrieval.exclude_s", "5.05")
     with open(tmp_path / "out" / "loops.csv") as file:
         rows = list(csv.DictReader(file))
+    drive = revisit.simulate(world="warehouse", sensor="vlp16", seed=7, frames=150, difficulty=1)
     loops = revisit.detect(drive, short_past, progress=False)
     assert len(loops) > 20
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["counts"]["loops_found_later"] > 0
     assert [(int(row["query"]), int(row["match"])) for row in rows] == [(loop.query, loop.match) for loop in loops]
     for row, loop in zip(rows, loops):
-        for axis, name in enumerate(("tx", "ty", "tz")):
-            assert row[name] == f"{loop.T_match_query[axis, 3]:.10g}"
+        for name, value in {"score": loop.score, "inlier_ratio": loop.inlier_ratio, "rmse_m": loop.rmse_m,
+                            **dict(zip(("tx", "ty", "tz"), loop.T_match_query[:3, 3]))}.items():
+            assert row[name] == f"{value:.10g}", name
+        x, y, z, w = (float(row[name]) for name in ("qx", "qy", "qz", "qw"))
+        rotation = [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                    [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                    [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
+        np.testing.assert_allclose(loop.T_match_query[:3, :3], rotation, atol=1e-8)
 
 
 def test_results_are_easy_to_look_at(scans, short_past):

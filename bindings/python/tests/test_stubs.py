@@ -20,6 +20,18 @@ def members(node):
     return functions | {each.target.id for each in node.body if isinstance(each, ast.AnnAssign)}
 
 
+PLOT = STUB.with_name("plot.pyi")
+
+
+def test_plots_take_what_their_stubs_say():
+    import revisit.plot
+    stubbed = {node.name: [each.arg for each in node.args.args] for node in ast.parse(PLOT.read_text()).body
+               if isinstance(node, ast.FunctionDef)}
+    there = {name: list(inspect.signature(each).parameters) for name, each in vars(revisit.plot).items()
+             if inspect.isfunction(each) and not name.startswith("_")}
+    assert stubbed == there
+
+
 def test_every_public_name_has_a_stub():
     defined = {node.name for node in TREE.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))} | members(TREE)
     assert set(revisit.__all__) <= defined
@@ -53,15 +65,18 @@ def test_mypy_agrees(tmp_path):
     if not shutil.which("mypy"):
         pytest.skip("needs mypy (make python)")
     (tmp_path / "stubs" / "revisit").mkdir(parents=True)
-    shutil.copyfile(STUB, tmp_path / "stubs" / "revisit" / "__init__.pyi")
+    for stub in (STUB, PLOT):
+        shutil.copy(stub, tmp_path / "stubs" / "revisit")
     program = tmp_path / "program.py"
     program.write_text("""import numpy as np
 import revisit
+import revisit.plot
 recording = revisit.open_recording("drive.bag")
 detector = revisit.LoopDetector(revisit.Parameters(retrieval={"top_k": 5}), recording=recording)
 loops = [d.loop.T_match_query for d in map(detector.process, recording) if d.loop]
 detection = detector.process(np.zeros((3, 4)), stamp=1.0)
 reveal_type(detection.loop)
+revisit.plot.trajectory(np.zeros((5, 4, 4)), detection.loops)
 """)
     mypy = subprocess.run([sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path / "cache"), str(program)],
                           capture_output=True, text=True, env={"MYPYPATH": str(tmp_path / "stubs"), "PATH": "/usr/bin:/bin"})
