@@ -54,15 +54,11 @@ void ParameterFlags::add_to(CLI::App& command, const std::vector<std::string>& s
     const std::string section = info.name.substr(0, info.name.find('.'));
     const bool is_named = std::find(sections.begin(), sections.end(), section) != sections.end();
     if (sections.empty() ? section == "simulation" : !is_named) continue;
-    const std::string range = info.is_text ? "text"
-                              : info.is_switch
-                                  ? "true or false"
-                                  : CLI::detail::to_string(info.min) + " to " + CLI::detail::to_string(info.max);
     command
         .add_option_function<std::string>(
             "--" + (names == Names::kShort ? info.name.substr(section.size() + 1) : info.name),
             [this, name = info.name](const std::string& value) { values_[name] = value; },
-            info.help + " [" + info.default_value + "; " + range + "]")
+            info.help + " [" + info.default_value + "; " + allowed_values(info) + "]")
         ->type_name("")
         ->group("Parameters [default; allowed], over the file");
   }

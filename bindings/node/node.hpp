@@ -45,7 +45,7 @@ bool is_setting(const std::string& name);
 
 /// One parameter of the program, as a node declares it.
 struct ParameterText {
-  std::string name, help, value;
+  std::string name, help, value, allowed;
 };
 std::vector<ParameterText> parameters();
 

@@ -13,7 +13,8 @@ namespace revisit::node {
 std::vector<ParameterText> parameters() {
   std::vector<ParameterText> texts;
   for (const ParameterInfo& each : parameter_infos())
-    if (!each.name.starts_with("simulation.")) texts.push_back({each.name, each.help, each.default_value});
+    if (!each.name.starts_with("simulation."))
+      texts.push_back({each.name, each.help, each.default_value, allowed_values(each)});
   return texts;
 }
 

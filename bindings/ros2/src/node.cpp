@@ -8,8 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
 #include <diagnostic_msgs/msg/diagnostic_array.hpp>
 #include <geometry_msgs/msg/pose_with_covariance_stamped.hpp>
 #include <nav_msgs/msg/odometry.hpp>
@@ -28,6 +26,7 @@
 #include <revisit_ros/msg/loop.hpp>
 
 #include "node.hpp"
+#include "releases.hpp"
 #include "ros_messages.hpp"
 
 namespace revisit_ros {
@@ -105,6 +104,7 @@ class RevisitNode final : public rclcpp_lifecycle::LifecycleNode, public node::O
     for (const auto& each : node::parameters()) {
       rcl_interfaces::msg::ParameterDescriptor descriptor;
       descriptor.description = each.help;
+      descriptor.additional_constraints = each.allowed;
       descriptor.dynamic_typing = true;  // numbers may be written as such
       declare_parameter(each.name, rclcpp::ParameterValue(each.value), descriptor);
     }
@@ -122,13 +122,12 @@ class RevisitNode final : public rclcpp_lifecycle::LifecycleNode, public node::O
   using State = rclcpp_lifecycle::State;
 
   Return on_configure(const State&) override {
-    const rclcpp::QoS latched = rclcpp::QoS(1).transient_local();
     loops_ = rclcpp::create_publisher<Ros2::Loop>(*this, "~/loops", 100);
     loop_poses_ = rclcpp::create_publisher<Ros2::StampedPose>(*this, "~/loop_poses", 100);
     pose_ = rclcpp::create_publisher<Ros2::StampedPose>(*this, "~/pose", 10);
-    path_ = rclcpp::create_publisher<Ros2::Path>(*this, "~/path", latched);
-    graph_ = rclcpp::create_publisher<Ros2::MarkerArray>(*this, "~/graph", latched);
-    map_ = rclcpp::create_publisher<PointCloud2>(*this, "~/map_cloud", latched);
+    path_ = create_latched<Ros2::Path>(*this, "~/path");
+    graph_ = create_latched<Ros2::MarkerArray>(*this, "~/graph");
+    map_ = create_latched<PointCloud2>(*this, "~/map_cloud");
     tiles_.reset();
     tf_ = rclcpp::create_publisher<tf2_msgs::msg::TFMessage>(*this, "/tf", 100);
     diagnostics_ = rclcpp::create_publisher<Ros2::DiagnosticArray>(*this, "/diagnostics", 10);
@@ -200,8 +199,7 @@ class RevisitNode final : public rclcpp_lifecycle::LifecycleNode, public node::O
     };
     map_->publish(message(cloud.overview));
     // A new publisher, which keeps as many messages for those that come later as there are tiles.
-    tiles_ = rclcpp::create_publisher<PointCloud2>(
-        *this, "~/map_tiles", rclcpp::QoS(std::max<std::size_t>(1, cloud.tiles.size())).transient_local());
+    tiles_ = create_latched<PointCloud2>(*this, "~/map_tiles", std::max<std::size_t>(1, cloud.tiles.size()));
     for (const auto& tile : cloud.tiles) tiles_->publish(message(tile));
   }
   void send(const node::Health& health) override {
@@ -228,9 +226,9 @@ class RevisitNode final : public rclcpp_lifecycle::LifecycleNode, public node::O
  private:
   bool read_settings(node::Settings& settings, std::string& error) {
     for (const char* name : {"mode", "map", "resume", "map_frame", "odom_frame", "base_frame", "queue"})
-      if (!node::set(settings, name, get_parameter(name).value_to_string(), error)) return false;
+      if (!node::set(settings, name, text_of(get_parameter(name)), error)) return false;
     for (const auto& each : node::parameters())
-      if (const std::string text = get_parameter(each.name).value_to_string(); text != each.value)
+      if (const std::string text = text_of(get_parameter(each.name)); text != each.value)
         if (!node::set(settings, each.name, text, error)) return false;
     return true;
   }
@@ -243,7 +241,7 @@ class RevisitNode final : public rclcpp_lifecycle::LifecycleNode, public node::O
     result.successful = read_settings(settings, result.reason);
     for (const rclcpp::Parameter& each : parameters)  // others are ROS's own
       if (result.successful && node::is_setting(each.get_name()))
-        result.successful = node::set(settings, each.get_name(), each.value_to_string(), result.reason);
+        result.successful = node::set(settings, each.get_name(), text_of(each), result.reason);
     for (const auto& each : node::parameters())  // as read_settings() leaves them out
       if (const auto found = settings.parameters.find(each.name);
           found != settings.parameters.end() && found->second == each.value)

@@ -10,14 +10,6 @@ namespace {
 std::string section_of(const std::string& name) { return name.substr(0, name.find('.')); }
 std::string field_of(const std::string& name) { return name.substr(name.find('.') + 1); }
 
-std::string allowed(const ParameterInfo& info) {
-  if (info.is_text) return "";
-  if (info.is_switch) return "true or false";
-  std::ostringstream text;
-  text << info.min << " to " << info.max << (info.is_integer ? ", whole" : "");
-  return text.str();
-}
-
 }  // namespace
 
 // A TOML string; file names may hold anything.
@@ -71,7 +63,7 @@ std::string parameter_reference_markdown() {
       const std::string value = get_parameter(*preset(presets[i]), info.name);
       page << " " << (value == info.default_value ? "" : value) << " |";
     }
-    page << " " << allowed(info) << " | " << info.help << " |\n";
+    page << " " << allowed_values(info) << " | " << info.help << " |\n";
   }
   return page.str();
 }

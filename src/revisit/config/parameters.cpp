@@ -174,6 +174,12 @@ std::vector<ParameterInfo> parameter_infos() {
   return infos;
 }
 
+std::string allowed_values(const ParameterInfo& info) {
+  if (info.is_text) return info.choices.empty() ? "text" : info.choices;
+  if (info.is_switch) return "true or false";
+  return to_text(info.min) + " to " + to_text(info.max) + (info.is_integer ? ", whole" : "");
+}
+
 std::vector<std::string> preset_names() { return {"default", "paper", "grid20x60"}; }
 
 Result<Parameters> preset(std::string_view name) {

@@ -112,6 +112,9 @@ struct ParameterInfo {
 /// All parameters in the order of the reference page.
 std::vector<ParameterInfo> parameter_infos();
 
+/// The values that a parameter may have, in words.
+std::string allowed_values(const ParameterInfo& info);
+
 /// "default", "paper" (its printed thresholds, to the letter), "grid20x60" (the authors' program's grid).
 std::vector<std::string> preset_names();
 Result<Parameters> preset(std::string_view name);
