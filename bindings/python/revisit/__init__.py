@@ -328,6 +328,21 @@ class PlaceIndex:
     def save(self, path):
         self._index.save(_os.fspath(path))
 
+    @property
+    def frames(self):
+        """Of the places, in the order in which they were added: N, int64."""
+        return self._index.frames
+
+    @property
+    def intensities(self):
+        """Of all descriptors: N x rings x sectors, uint8; a copy."""
+        return self._index.intensities
+
+    @property
+    def occupancies(self):
+        """Of all descriptors: N x layers x rings x sectors, bool; a copy."""
+        return self._index.occupancies
+
     def __len__(self):
         return len(self._index)
 

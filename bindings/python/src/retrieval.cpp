@@ -7,24 +7,29 @@
 namespace revisit::python {
 namespace {
 
+// Descriptors keep columns together; arrays have rings before sectors, as pictures have rows before columns.
+void put_intensity(const DescriptorView& of, std::uint8_t* to) {
+  for (int ring = 0; ring < of.rings; ++ring)
+    for (int sector = 0; sector < of.sectors; ++sector) *to++ = of.intensity[sector * of.rings + ring];
+}
+
+void put_occupancy(const DescriptorView& of, bool* to) {
+  for (int row = 0; row < of.rows(); ++row)
+    for (int sector = 0; sector < of.sectors; ++sector) {
+      const auto bit = static_cast<std::size_t>(sector * of.rows() + row);
+      *to++ = (of.occupancy[bit / 64] >> (bit % 64) & 1u) != 0;
+    }
+}
+
 py::array_t<std::uint8_t> intensity(const IntensityScanContext& of) {
   py::array_t<std::uint8_t> array({of.rings, of.sectors});
-  auto values = array.mutable_unchecked<2>();
-  for (int ring = 0; ring < of.rings; ++ring)
-    for (int sector = 0; sector < of.sectors; ++sector)
-      values(ring, sector) = of.intensity[static_cast<std::size_t>(sector) * static_cast<std::size_t>(of.rings) +
-                                          static_cast<std::size_t>(ring)];
+  put_intensity(of, array.mutable_data());
   return array;
 }
 
 py::array_t<bool> occupancy(const IntensityScanContext& of) {
-  const int layers = std::max(1, of.levels);
-  py::array_t<bool> array({layers, of.rings, of.sectors});
-  auto values = array.mutable_unchecked<3>();
-  for (int layer = 0; layer < layers; ++layer)
-    for (int ring = 0; ring < of.rings; ++ring)
-      for (int sector = 0; sector < of.sectors; ++sector)
-        values(layer, ring, sector) = of.occupied(ring, sector, layer);
+  py::array_t<bool> array({std::max(1, of.levels), of.rings, of.sectors});
+  put_occupancy(of, array.mutable_data());
   return array;
 }
 
@@ -52,8 +57,47 @@ class Index {
     }));
   }
   std::size_t size() const { return index_.size(); }
+  py::array_t<std::int64_t> frames() const {
+    py::array_t<std::int64_t> array(static_cast<py::ssize_t>(size()));
+    for (py::ssize_t i = 0; i < array.size(); ++i)
+      array.mutable_at(i) = index_.frame(static_cast<std::size_t>(i)).value;
+    return array;
+  }
+  py::array_t<std::uint8_t> intensities() const {
+    return of_places<std::uint8_t>(
+        [](const DescriptorView& of) {
+          return std::vector<py::ssize_t>{of.rings, of.sectors};
+        },
+        put_intensity);
+  }
+  py::array_t<bool> occupancies() const {
+    return of_places<bool>(
+        [](const DescriptorView& of) {
+          return std::vector<py::ssize_t>{std::max(1, of.levels), of.rings, of.sectors};
+        },
+        put_occupancy);
+  }
 
  private:
+  template <typename Value>
+  py::array_t<Value> of_places(std::vector<py::ssize_t> (*shape_of)(const DescriptorView&),
+                               void (*put)(const DescriptorView&, Value*)) const {
+    const std::size_t places = size();
+    std::vector<py::ssize_t> shape{0};
+    std::optional<py::array_t<Value>> array;
+    for (std::size_t i = 0; i < places; ++i) {
+      const auto descriptor = index_.find(index_.frame(i));
+      if (!descriptor) throw py::value_error("place " + std::to_string(i) + " of the index: its file was altered");
+      if (!array) {
+        shape = shape_of(*descriptor);
+        shape.insert(shape.begin(), static_cast<py::ssize_t>(places));
+        array.emplace(shape);
+      }
+      put(*descriptor, array->mutable_data(static_cast<py::ssize_t>(i)));
+    }
+    return array ? *std::move(array) : py::array_t<Value>(shape);
+  }
+
   PlaceIndex index_;
   std::mutex adding_;
 };
@@ -92,6 +136,9 @@ void bind_retrieval(py::module_& module) {
            "The best of the first `places` (all), best first: a structured array of match, geometry_score, "
            "intensity_score, yaw_rad.")
       .def("save", &Index::save, py::arg("path"))
+      .def_property_readonly("frames", &Index::frames)
+      .def_property_readonly("intensities", &Index::intensities)
+      .def_property_readonly("occupancies", &Index::occupancies)
       .def("__len__", &Index::size);
 }
 

@@ -234,6 +234,11 @@ def test_places_are_added_searched_saved_and_opened(scans, tmp_path):
     assert best["match"] == 7 and best["geometry_score"] == 1.0
     index.save(tmp_path / "index")
     again = revisit.PlaceIndex.open(tmp_path / "index")
+    for each in (index, again):
+        assert each.frames.tolist() == list(range(len(index)))
+        np.testing.assert_array_equal(each.intensities[7], revisit.describe(scans[7]).intensity)
+        np.testing.assert_array_equal(each.occupancies[7], revisit.describe(scans[7]).occupancy)
+    assert len(revisit.PlaceIndex().frames) == len(revisit.PlaceIndex().intensities) == 0
     assert len(again) == 40
     np.testing.assert_array_equal(again.search(descriptors[9]), index.search(descriptors[9]))
     with pytest.raises(ValueError):
@@ -298,15 +303,25 @@ def test_memory_stays_where_it_is(scans):
             return next(int(line.split()[1]) for line in file if line.startswith("VmRSS"))
 
     points = scans[0].points[::20].copy()
-    for _ in range(200):
-        revisit.Scan(points).points
-        revisit.describe(points)
+    index = revisit.PlaceIndex()
+    index.add(0, revisit.describe(points))
+    detector = revisit.LoopDetector()
+    for scan in scans[:5]:
+        detector.process(scan)
+
+    def calls(times):  # six each
+        for _ in range(times):
+            scan = revisit.Scan(points)
+            scan.points
+            index.search(revisit.describe(scan))
+            detector.localise(scan).to_dict()
+        for _ in range(times // 50):
+            revisit.register_scans(scans[3], scans[2])
+
+    calls(100)
     gc.collect()
     before = resident_kB()
-    for _ in range(3300):  # three calls each
-        scan = revisit.Scan(points)
-        scan.points
-        revisit.describe(scan)
+    calls(1700)
     gc.collect()
     assert resident_kB() - before < 8000
 
