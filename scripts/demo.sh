@@ -30,5 +30,5 @@ if [ -n "${reference:-}" ]; then
   build/revisit view "$out" --report "$out/view.html"
   echo "In a browser, with both scans of each loop: build/revisit view $out"
 else
-  echo "Report: $out/loops.csv (no reference poses: nothing to score against)"
+  echo "No reference poses: nothing to score against. In a browser: build/revisit view $out"
 fi

@@ -16,6 +16,7 @@
 #include <revisit/core/pose.hpp>
 #include <revisit/core/stamps.hpp>
 #include <revisit/pipeline/loop_detector.hpp>
+#include <revisit/store/map_store.hpp>
 
 #include "inbox.hpp"
 #include "shared_data.hpp"
@@ -283,6 +284,30 @@ TEST(Node, LocaliseAnswersFromASavedMap) {
   EXPECT_EQ(in_tiles, cloud.overview.size());
   EXPECT_GT(squares.size(), 1u);
   EXPECT_FALSE(node->save_map("", message)) << "nothing to save";
+}
+
+TEST(Node, FixesOfAReceiverAreKeptWithTheMap) {
+  Settings settings = settings_of("slam");
+  settings.map = (fresh_folder() / "map").string();
+  Listener listener;
+  std::string message;
+  {
+    const auto node = Node::make(settings, listener, message);
+    ASSERT_TRUE(node) << message;
+    for (int i = 0; i < kThere; ++i) {
+      const Eigen::Vector3d at_m = pose_of(i).translation();
+      node->add(GpsFix{stamp_of(i) - 20'000'000, 48.0 + at_m.y() / 111'000.0, 8.0 + at_m.x() / 74'000.0, 300.0,
+                       Eigen::Vector3d::Constant(2.0)});
+      node->add(to_message(scan_of(i), stamp_of(i)));
+    }
+    EXPECT_TRUE(node->finish(message)) << message;
+  }
+  const auto store = MapStore::open(MapStore::file_of(settings.map), MapStore::Access::kRead);
+  ASSERT_TRUE(store) << store.error().message;
+  const auto fixes = store->fixes();
+  ASSERT_TRUE(fixes);
+  ASSERT_GE(fixes->size(), 3u) << "one in 10 m";
+  EXPECT_NEAR(fixes->front().fix.latitude_deg, 48.0, 1e-4);
 }
 
 TEST(Node, ServicesWorkBesideScans) {

@@ -56,8 +56,9 @@ Result<std::map<FrameId, Pose>> read_truth(const fs::path& folder) {
   return truth;
 }
 
-// Rows of numbers by pairs of frames; cells that are empty or no numbers are left out.
-std::map<std::pair<std::int64_t, std::int64_t>, Json> read_evidence(const fs::path& file) {
+// Rows of numbers by pairs of frames; cells that are empty or no numbers are left out. Rows without both frames are
+// named in `problems`; a last one that is still being written is none.
+std::map<std::pair<std::int64_t, std::int64_t>, Json> read_evidence(const fs::path& file, Json& problems) {
   std::map<std::pair<std::int64_t, std::int64_t>, Json> evidence;
   std::ifstream stream(file);
   std::string line;
@@ -65,7 +66,9 @@ std::map<std::pair<std::int64_t, std::int64_t>, Json> read_evidence(const fs::pa
   std::vector<std::string> names;
   std::istringstream head(line);
   for (std::string name; std::getline(head, name, ',');) names.push_back(name);
-  while (std::getline(stream, line)) {
+  std::size_t number = 1, first_bad = 0, bad = 0;
+  while (std::getline(stream, line) && !stream.eof()) {
+    ++number;
     std::istringstream row(line);
     Json values;
     std::size_t column = 0;
@@ -73,18 +76,28 @@ std::map<std::pair<std::int64_t, std::int64_t>, Json> read_evidence(const fs::pa
       const Json value = Json::parse(cell, nullptr, false);
       if (value.is_number()) values[names[column]] = value;
     }
-    if (!values.contains("query") || !values.contains("match")) continue;
+    if (!values.contains("query") || !values.contains("match")) {
+      if (bad++ == 0) first_bad = number;
+      continue;
+    }
     const std::pair key{values["query"].get<std::int64_t>(), values["match"].get<std::int64_t>()};
     evidence[key] = std::move(values);
   }
+  if (bad > 0)
+    problems.push_back(file.filename().string() + ":" + std::to_string(first_bad) + ": no numbers of two frames (" +
+                       std::to_string(bad) + " such rows); the evidence of these candidates is not shown");
   return evidence;
 }
 
-Json read_run_facts(const fs::path& file) {
+Json read_run_facts(const fs::path& file, Json& problems) {
   std::ifstream stream(file);
   const Json run = Json::parse(stream, nullptr, false);
   Json facts = Json::object();
-  if (!run.is_object()) return facts;
+  if (!run.is_object()) {
+    if (is_there(file))
+      problems.push_back(file.filename().string() + ": is no JSON object; times, counts and memory are not shown");
+    return facts;
+  }
   for (const char* name : {"counts", "ms_per_scan"}) {
     if (!run.contains(name) || !run[name].is_object()) continue;
     for (const auto& [key, value] : run[name].items())
@@ -131,8 +144,8 @@ Json scans_of(const ViewData& data) {
   return scans;
 }
 
-Json loops_of(const ViewData& data, const Reference& reference, const fs::path& folder) {
-  const auto evidence = read_evidence(folder / "evidence.csv");
+Json loops_of(const ViewData& data, const Reference& reference, const fs::path& folder, Json& problems) {
+  const auto evidence = read_evidence(folder / "evidence.csv", problems);
   std::map<std::pair<FrameId, FrameId>, JudgedLoop> judged;
   for (const JudgedLoop& each : evaluate_loops(data.loops, reference).loops) judged[{each.query, each.match}] = each;
   // The true pose of a query in its match.
@@ -263,19 +276,21 @@ Result<ViewData> read_detect_view(const fs::path& folder) {
 
 Result<std::string> to_view_json(const ViewData& data, const fs::path& folder) {
   const Reference reference = reference_of(data);
+  Json problems = Json::array();
   Json view = {{"format", "revisit view"},
                {"version", 1},
                {"title", data.title},
                {"command", data.command},
                {"input", data.input},
                {"sessions", data.sessions},
-               {"run", read_run_facts(folder / "run.json")},
+               {"run", read_run_facts(folder / "run.json", problems)},
                {"has_truth", !data.truth.empty()},
                {"revisits", reference.revisits().size()},
                {"has_tiles", data.has_tiles},
                {"scans", scans_of(data)},
-               {"loops", loops_of(data, reference, folder)},
+               {"loops", loops_of(data, reference, folder, problems)},
                {"answers", answers_of(data, reference)}};
+  view["problems"] = std::move(problems);
   if (data.north_deg) view["north_deg"] = rounded(*data.north_deg);
   return view.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

@@ -81,10 +81,12 @@ function start(views: View[]) {
   const header = h("header", {}, h("h1", {}, title), summary);
   app.replaceChildren(header, stageBox, tabs.root, timeline.root);
 
+  const problems = views.flatMap((each) => each.problems);
   const say = (text: string) => {
-    notice.textContent = text;
-    notice.hidden = text === "";
+    notice.textContent = [text, ...problems].filter((part) => part !== "").join(" · ");
+    notice.hidden = notice.textContent === "";
   };
+  say("");
   stage.onDraw = () => {
     showScale(scale, stage.metresAPixel());
     up.style.transform = `rotate(${stage.controls.getAzimuthalAngle() - ((north_deg ?? 0) * Math.PI) / 180}rad)`;

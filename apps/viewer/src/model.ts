@@ -38,6 +38,7 @@ export interface View {
   sessions: string[];
   run: { version?: string; counts?: Record<string, number>; ms_per_scan?: Record<string, number>; memory_mb?: [number, number][]; interrupted?: boolean };
   north_deg?: number;
+  problems: string[];
   has_truth: boolean;
   has_tiles: boolean;
   revisits: number;
