@@ -2,6 +2,7 @@
 // Where releases of ROS 2 from Humble to Rolling differ, or where rclcpp falls short. Not compiled here (README.md).
 #pragma once
 
+#include <charconv>
 #include <cstddef>
 #include <string>
 
@@ -13,8 +14,6 @@
 #include <tf2_ros/transform_listener.h>
 #endif
 #include <rclcpp/rclcpp.hpp>
-
-#include <revisit/core/text.hpp>
 
 namespace revisit_ros {
 
@@ -29,8 +28,9 @@ auto create_latched(Node& node, const std::string& topic, std::size_t depth = 1)
 
 /// The value with all its digits: rclcpp writes numbers with six places.
 inline std::string text_of(const rclcpp::Parameter& parameter) {
-  const bool is_number = parameter.get_type() == rclcpp::ParameterType::PARAMETER_DOUBLE;
-  return is_number ? revisit::format("%.17g", parameter.as_double()) : parameter.value_to_string();
+  if (parameter.get_type() != rclcpp::ParameterType::PARAMETER_DOUBLE) return parameter.value_to_string();
+  char digits[32];
+  return {digits, std::to_chars(digits, digits + sizeof digits, parameter.as_double()).ptr};
 }
 
 }  // namespace revisit_ros
