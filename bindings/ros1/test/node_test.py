@@ -43,6 +43,7 @@ import rosgraph  # noqa: E402  (both read the environment)
 import rosnode  # noqa: E402
 import rospy  # noqa: E402
 import tf2_msgs.msg  # noqa: E402
+import tf2_ros  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from geometry_msgs.msg import PoseWithCovarianceStamped  # noqa: E402
 from nav_msgs.msg import Path  # noqa: E402
@@ -212,8 +213,16 @@ class NodeTest(unittest.TestCase):
         again = Node("slam", map=MAP)
         self.assertEqual(again.process.wait(30), 1, "a map that is there is not overwritten")
         node = Node("slam", "_resume:=true", map=MAP)
+        buffer = tf2_ros.Buffer(rospy.Duration(1000))
+        listener = tf2_ros.TransformListener(buffer)
         self.assertEqual(play("-s", f"{before + 0.1:.1f}").wait(60), 0)
         wait_until(lambda: node.heard["/revisit/pose"] and node.last("/revisit/pose").header.stamp.to_sec() > LAST_S)
+        # Others ask tf where odometry is in the map.
+        wait_until(lambda: buffer.can_transform("map", "odom", rospy.Time(0)))
+        seen = buffer.lookup_transform("map", "odom", rospy.Time(0))
+        self.assertGreater(seen.header.stamp.to_sec(), LAST_S - 1)
+        self.assertNear((seen.transform.rotation.x, seen.transform.rotation.y), (0, 0), 0.05)
+        listener.unregister()
         answer = node.call("publish_map")
         self.assertTrue(answer.success, answer.message)
         wait_until(lambda: node.heard["/revisit/map_cloud"])
@@ -301,6 +310,24 @@ class NodeTest(unittest.TestCase):
         self.assertIn("descriptor.rings", answer.message)
         publisher.unregister()
         self.assertEqual(node.end(), 0)
+
+    def test_3b_by_the_clock_of_the_bag(self):
+        rospy.set_param("/use_sim_time", True)
+        try:
+            node = Node("detect")
+            self.assertEqual(play("--clock").wait(60), 0)
+            wait_until(lambda: node.heard["/diagnostics"] and len(node.heard["/revisit/loops"]) > 20)
+            self.assertLess(node.last("/diagnostics").header.stamp.to_sec(), 60, "not the time of day")
+        finally:
+            rospy.delete_param("/use_sim_time")
+        self.assertEqual(node.end(signal.SIGTERM), 0)
+
+    def test_8_launch_files_say_which_nodes_they_start(self):
+        folder = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "launch")
+        for name in sorted(os.listdir(folder)):
+            if name.endswith(".launch"):
+                listed = subprocess.run(["roslaunch", "--nodes", os.path.join(folder, name)], capture_output=True, text=True, timeout=60)
+                self.assertIn("/revisit", listed.stdout.split(), f"{name}: {listed.stdout} {listed.stderr}")
 
     def test_6_says_what_is_wrong(self):
         log = subprocess.run([NODE, "_mode:=fly"], capture_output=True, text=True, timeout=30)
