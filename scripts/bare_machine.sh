@@ -16,6 +16,7 @@ clean_up() {
   rm -rf --one-file-system "$root"
 }
 trap clean_up EXIT
+echo '127.0.0.1 localhost' > "$root/etc/hosts"  # which an installed system has
 inside() { chroot "$root" env DEBIAN_FRONTEND=noninteractive HOME=/root ${registry:+npm_config_registry="$registry"} bash -euc "$1"; }
 registry=$(npm config get registry 2> /dev/null || true)  # a mirror, where there is one
 inside 'apt-get update -qq > /dev/null; mount -t proc proc /proc 2> /dev/null || true'

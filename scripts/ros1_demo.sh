@@ -14,7 +14,9 @@ bag=$out/town.bag
 roslaunch revisit_ros revisit.launch mode:=slam map:="$PWD/$out/map" > "$out/node.log" 2>&1 &
 launch=$!
 trap 'kill -INT $launch 2>/dev/null || true; wait $launch || true' EXIT
-for _ in $(seq 100); do rosservice list 2>/dev/null | grep -q /revisit/save_map && break; sleep 0.2; done
+is_ready() { rosservice list 2>/dev/null | grep -q /revisit/save_map; }
+for _ in $(seq 100); do is_ready && break; sleep 0.2; done
+is_ready || { tail -n 20 "$out/node.log" >&2; echo "the node did not start within 20 s: its last lines are above, all of them in $out/node.log" >&2; exit 1; }
 echo "playing $bag, twice as fast as it was driven"
 /usr/lib/rosbag/play -r 2 "$bag" > /dev/null
 rosservice call /revisit/save_map

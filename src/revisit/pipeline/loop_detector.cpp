@@ -11,7 +11,9 @@ namespace revisit {
 LoopDetector::LoopDetector(const Parameters& parameters, const std::optional<IntensityScale>& scale,
                            IntensityCalibration calibration, LogSink log, std::unique_ptr<PlaceClouds> clouds)
     : front_end_(parameters, scale, std::move(calibration), std::move(log)),
-      recognition_(parameters, std::move(clouds)) {}
+      recognition_(parameters, std::move(clouds)) {
+  recognition_.expect_one_drive();
+}
 
 Result<Detection> LoopDetector::process(Scan scan, const std::optional<Pose>& T_world_lidar) {
   auto prepared = follow(std::move(scan));

@@ -74,6 +74,10 @@ class PlaceRecognition {
                      each.descriptor.levels == parameters_.descriptor.levels);
   }
 
+  /// Places and queries come from one drive: where odometry lost track in between, nothing tells look-alikes apart, and
+  /// a loop in the open must show more by itself. Without, whoever uses the loops compares them with one another (Slam).
+  void expect_one_drive() { is_one_drive_ = true; }
+
   const PlaceIndex& index() const { return index_; }
   /// How much alike the places are (LookAlikes): as this run learnt, or as the map says.
   double look_alikes_log_odds() const { return look_alikes_of_map_ ? *look_alikes_of_map_ : look_alikes_.log_odds(); }
@@ -99,6 +103,7 @@ class PlaceRecognition {
   BackwardFollowing backward_;  ///< of LoopDetector alone; Slam and its --resume do without
   LookAlikes look_alikes_;
   std::optional<double> look_alikes_of_map_;
+  bool is_one_drive_ = false;
   std::size_t queries_ = 0;
   struct RecentQuery {
     FrameId frame;

@@ -42,6 +42,9 @@ struct VerificationContext {
   TypicalAgreement typical;
   double look_alikes_log_odds = 0.0;  ///< LookAlikes
   FrameId newest;                     ///< place that may answer
+  /// Of a pose in the open, at a place of which odometry does not know how it lies to the query, since it lost track in
+  /// between.
+  double unknown_in_the_open_log_odds = 0.0;
 };
 
 /// How one hypothesis about a query is tested: seen from overhead, then temporal consistency, then registration

@@ -51,8 +51,9 @@ std::optional<Refusal> refuse_heading(const std::optional<TrajectoryPoint>& plac
 }
 
 double odometry_log_odds(const std::optional<TrajectoryPoint>& place, const std::optional<TrajectoryPoint>& query,
-                         const Pose& T_place_query) {
-  if (!place || !query || place->origin != query->origin) return 0.0;
+                         const Pose& T_place_query, double unknown_log_odds) {
+  if (!place || !query) return 0.0;
+  if (place->origin != query->origin) return unknown_log_odds;
   const double off_m = (T_between(*place, *query).inverse() * T_place_query).translation().norm();
   const double deviation_m = Drift::kDeviation_m + Apart(*place, *query).drift_m(Drift::kUsualShare);
   return -std::min(0.5 * std::pow(off_m / deviation_m, 2), Drift::kMost_log_odds);

@@ -23,9 +23,9 @@ std::optional<Refusal> refuse_heading(const std::optional<TrajectoryPoint>& plac
 
 /// Log odds that odometry takes from a pose, 0 or less: those of a Gaussian whose deviation is 5 m and a hundredth of
 /// the motion in between, at most 8, since odometry may have gone wrong. Like houses in a row are told apart by nothing
-/// else.
+/// else. `unknown_log_odds` where odometry lost track in between.
 double odometry_log_odds(const std::optional<TrajectoryPoint>& place, const std::optional<TrajectoryPoint>& query,
-                         const Pose& T_place_query);
+                         const Pose& T_place_query, double unknown_log_odds = 0.0);
 
 /// Whether a query cannot stand at both poses at once, one found relative to place `a`, the other to `b`; false where
 /// odometry does not know how the places lie to each other.

@@ -46,6 +46,9 @@ TEST(Elsewhere, IsTheLessLikelyTheFartherOdometryIs) {
   EXPECT_NEAR(odometry_log_odds(place, query, planar_pose(470.0, 0.0, 0.0)), -4.5, 1e-9);
   EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, planar_pose(0.0, 0.0, 0.0)), -8.0);
   EXPECT_DOUBLE_EQ(odometry_log_odds(place, lost, planar_pose(0.0, 0.0, 0.0)), 0.0);
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, lost, planar_pose(0.0, 0.0, 0.0), -3.0), -3.0);
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, planar_pose(500.0, 0.0, 0.0), -3.0), 0.0);
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, std::nullopt, planar_pose(0.0, 0.0, 0.0), -3.0), 0.0) << "a scan alone";
 }
 
 TEST(Elsewhere, IsNotKnownWithoutOdometry) {

@@ -44,8 +44,10 @@ double log_odds_by(const Coefficients& c, const LoopEvidence& evidence) {
 
 }  // namespace
 
+bool is_in_the_open(const LoopEvidence& evidence) { return evidence.voxel_m >= Scale::kFine_m; }
+
 double loop_log_odds(const LoopEvidence& evidence) {
-  const Scale& scale = evidence.voxel_m < Scale::kFine_m ? kFine : kCoarse;
+  const Scale& scale = is_in_the_open(evidence) ? kCoarse : kFine;
   if (!evidence.intensity_agreement) return log_odds_by(scale.without, evidence);
   const double with = log_odds_by(scale.with_intensity, evidence);
   if (!evidence.sensors_differ) return with;

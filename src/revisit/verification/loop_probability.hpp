@@ -30,6 +30,10 @@ struct LoopEvidence {
 /// how). Holds for the shipped voxel size and inlier distance. What is known besides is added (Bayes).
 double loop_log_odds(const LoopEvidence& evidence);
 
+/// Whether both scans were thinned as in the open. Right poses there mostly stand far above the threshold; in rooms and
+/// with few points, all that speaks for one is needed.
+bool is_in_the_open(const LoopEvidence& evidence);
+
 double probability_of(double log_odds);
 
 }  // namespace revisit
