@@ -74,8 +74,8 @@ class PlaceRecognition {
                      each.descriptor.levels == parameters_.descriptor.levels);
   }
 
-  /// Places and queries come from one drive: where odometry lost track in between, nothing tells look-alikes apart, and
-  /// a loop in the open must show more by itself. Without, whoever uses the loops compares them with one another (Slam).
+  /// Queries and the places of their session come from one drive: where odometry lost track in between, nothing tells
+  /// look-alikes apart, and a loop in the open must show more by itself.
   void expect_one_drive() { is_one_drive_ = true; }
 
   const PlaceIndex& index() const { return index_; }

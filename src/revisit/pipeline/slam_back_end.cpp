@@ -38,7 +38,9 @@ SlamBackEnd::SlamBackEnd(const Parameters& parameters, Odometry::Source source, 
       source_(source),
       store_(std::move(store)),
       log_(std::move(log)),
-      recognition_(parameters, clouds_in_store(store_)) {}
+      recognition_(parameters, clouds_in_store(store_)) {
+  recognition_.expect_one_drive();
+}
 
 Result<SlamBackEnd::Added> SlamBackEnd::add_keyframe(PreparedScan scan, const OdometryStep& odometry,
                                                      const SensorFacts& sensor) {

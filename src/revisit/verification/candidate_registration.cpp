@@ -152,8 +152,9 @@ void CandidateRegistration::register_scans(Hypothesis& hypothesis, const PosePre
   double support = context_.following.support_log_odds(query_.trajectory_point, place, found);
   if (prediction != nullptr && agree(prediction->T_match_query, found, found.translation().norm()))
     support = std::max(support, LoopFollowing::carried(prediction->log_odds, 0.0));
+  const bool is_same_session = session_of(hypothesis.candidate.match) == session_of(query_.frame);
   const double unknown_log_odds =
-      is_in_the_open(hypothesis.geometric->evidence) ? context_.unknown_in_the_open_log_odds : 0.0;
+      is_same_session && is_in_the_open(hypothesis.geometric->evidence) ? context_.unknown_in_the_open_log_odds : 0.0;
   if (options_.follow) support += odometry_log_odds(place, query_.trajectory_point, found, unknown_log_odds);
   decide(*hypothesis.geometric, context_.look_alikes_log_odds, support, options_);
   if (options_.follow && hypothesis.geometric->is_consistent())

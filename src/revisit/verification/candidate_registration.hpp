@@ -42,8 +42,8 @@ struct VerificationContext {
   TypicalAgreement typical;
   double look_alikes_log_odds = 0.0;  ///< LookAlikes
   FrameId newest;                     ///< place that may answer
-  /// Of a pose in the open, at a place of which odometry does not know how it lies to the query, since it lost track in
-  /// between.
+  /// Of a pose in the open, at a place of the same session of which odometry does not know how it lies to the query,
+  /// since it lost track in between.
   double unknown_in_the_open_log_odds = 0.0;
 };
 
