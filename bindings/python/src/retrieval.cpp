@@ -14,9 +14,10 @@ void put_intensity(const DescriptorView& of, std::uint8_t* to) {
 }
 
 void put_occupancy(const DescriptorView& of, bool* to) {
-  for (int row = 0; row < of.rows(); ++row)
-    for (int sector = 0; sector < of.sectors; ++sector) {
-      const auto bit = static_cast<std::size_t>(sector * of.rows() + row);
+  const auto rows = static_cast<std::size_t>(of.rows()), sectors = static_cast<std::size_t>(of.sectors);
+  for (std::size_t row = 0; row < rows; ++row)
+    for (std::size_t sector = 0; sector < sectors; ++sector) {
+      const std::size_t bit = sector * rows + row;
       *to++ = (of.occupancy[bit / 64] >> (bit % 64) & 1u) != 0;
     }
 }
