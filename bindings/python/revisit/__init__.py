@@ -96,7 +96,8 @@ def _interruptible(work):
             outcome["error"] = error
     thread = _threading.Thread(target=run, name="revisit", daemon=True)
     thread.start()
-    thread.join()
+    while thread.is_alive():
+        thread.join(0.2)  # a signal that another thread was given does not wake this one; its handler runs here all the same
     if "error" in outcome:
         raise outcome["error"]
     return outcome["result"]

@@ -135,7 +135,8 @@ def test_ctrl_c_is_obeyed_while_a_map_is_settled(scans):
             finish()
             ended.set()
     slam_itself, slam._slam = slam._slam, Slow()
-    threading.Thread(target=lambda: (began.wait(), os.kill(os.getpid(), signal.SIGINT))).start()
+    # Any thread may be given the signal: here it is one that does not wait for the map.
+    threading.Thread(target=lambda: (began.wait(), time.sleep(0.3), signal.pthread_kill(threading.get_ident(), signal.SIGINT))).start()
     with pytest.raises(KeyboardInterrupt):
         slam.finish()
     assert not ended.is_set()
