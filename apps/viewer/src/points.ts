@@ -51,6 +51,7 @@ export class MapPoints {
   private tiles: TilesRenderer | null = null;
   failure = "";
   private isAdapting = false;
+  private hasTileset = false;
   onChange = () => {};
 
   constructor(view: string) {
@@ -66,12 +67,16 @@ export class MapPoints {
       this.onChange();
     });
     tiles.addEventListener("load-error", ({ error, url }: any) => {
+      this.hasTileset = true;  // or never will have
       const name = String(url ?? "").split("/").pop();
       if (isReport) return;  // finer tiles are not in it
       this.failure = `${name}: ${error?.message ?? error}`;
       this.onChange();
     });
-    tiles.addEventListener("load-tileset", () => this.onChange());
+    tiles.addEventListener("load-tileset", () => {
+      this.hasTileset = true;
+      this.onChange();
+    });
     this.group.add(tiles.group);
   }
 
@@ -103,7 +108,7 @@ export class MapPoints {
 
   get isLoading(): boolean {
     const stats = (this.tiles as any)?.stats;
-    return this.isAdapting || (stats ? stats.downloading + stats.parsing > 0 : false);
+    return this.isAdapting || !this.hasTileset || (stats ? stats.downloading + stats.parsing > 0 : false);
   }
 
   dispose() {

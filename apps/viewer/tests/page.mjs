@@ -29,7 +29,7 @@ async function stageOf(page) {
   try {
     return await page.evaluate(() => {
       const { drawn, loading } = document.getElementById("stage")?.dataset ?? {};
-      return [Number(drawn ?? 0), loading === "true"];
+      return [Number(drawn ?? 0), loading !== "false"];
     });
   } catch (problem) {
     if (!/context was destroyed/.test(problem.message)) throw problem;
