@@ -286,6 +286,43 @@ TEST(Node, LocaliseAnswersFromASavedMap) {
   EXPECT_FALSE(node->save_map("", message)) << "nothing to save";
 }
 
+// What a sensor that looks ahead sees in one scan does not decide where it is, but with somebody's word it does.
+TEST(Node, AnInitialPoseIsLookedForThere) {
+  Settings settings = settings_of("slam");
+  settings.map = (fresh_folder() / "map").string();
+  Listener mapped;
+  EXPECT_EQ(drive(settings, mapped, 0, kThere), "");
+  settings.mode = "localise";
+  constexpr int kHere = 20;
+  const Pose T_map_lidar = pose_of(0).inverse() * pose_of(kHere);
+  const auto answers = [&](const std::optional<Pose>& T_map_lidar_said, const std::string& frame) {
+    Listener listener;
+    std::string message;
+    const auto node = Node::make(settings, listener, message);
+    EXPECT_TRUE(node) << message;
+    Pose T_base_lidar;
+    listener.look_up("base_link", "lidar", 0, T_base_lidar);
+    if (T_map_lidar_said) node->add(InitialPose{frame, *T_map_lidar_said * T_base_lidar.inverse()});
+    Scan scan = scan_of(kHere);
+    std::erase_if(scan.points, [](const Point& p) { return !(p.x > 0.f && std::abs(p.y) < p.x); });
+    node->add(to_message(scan, stamp_of(kHere)));
+    EXPECT_TRUE(node->finish(message)) << message;
+    return std::pair(listener.poses, listener.lines);
+  };
+  const Pose near = T_map_lidar * SyntheticWorld::at(1.0, -0.8, 0.2, 0.0),
+             far = T_map_lidar * SyntheticWorld::at(-12.0, 0.0, 0.0, 0.0);
+  EXPECT_TRUE(answers(std::nullopt, "map").first.empty());
+  EXPECT_TRUE(answers(far, "map").first.empty());
+  const auto found = answers(near, "map").first;
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_LT((T_map_lidar.inverse() * found[0].T_map_lidar).translation().norm(), 0.3);
+  const auto [elsewhere, lines] = answers(near, "odom");
+  EXPECT_TRUE(elsewhere.empty());
+  EXPECT_TRUE(std::any_of(lines.begin(), lines.end(), [](const std::string& line) {
+    return line.find("initial pose in the frame odom; it must be in map") != std::string::npos;
+  }));
+}
+
 TEST(Node, FixesOfAReceiverAreKeptWithTheMap) {
   Settings settings = settings_of("slam");
   settings.map = (fresh_folder() / "map").string();

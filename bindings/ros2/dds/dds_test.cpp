@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include <revisit/core/pose.hpp>
+#include <revisit/store/map_store.hpp>
 
 #include "dds_topic.hpp"
 #include "shared_data.hpp"
@@ -171,6 +172,9 @@ class Program {
   pid_t process_ = 0;
 };
 
+std::int64_t to_ns(const builtin_interfaces_msg_dds__Time_& time) {
+  return std::int64_t{time.sec} * 1'000'000'000 + time.nanosec;
+}
 builtin_interfaces_msg_dds__Time_ time_of(std::int64_t ns) {
   return {static_cast<std::int32_t>(ns / 1'000'000'000), static_cast<std::uint32_t>(ns % 1'000'000'000)};
 }
@@ -199,6 +203,17 @@ struct BigCloud {
   PointCloud2 message{};
 };
 
+// On the robot: one metre ahead of its base and 1.5 above it.
+const Pose kTBaseLidar = Pose(Eigen::Translation3d(1.0, 0.0, 1.5));
+void say_where_the_lidar_is(const Writer<TfMessage>& tf_static) {
+  geometry_msgs_msg_dds__TransformStamped_ mounted{
+      {time_of(kStart_ns), text("base_link")}, text("lidar"), {{1.0, 0.0, 1.5}, {0.0, 0.0, 0.0, 1.0}}};
+  TfMessage frames{};
+  frames.transforms._length = frames.transforms._maximum = 1;
+  frames.transforms._buffer = &mounted;
+  tf_static.write(frames);
+}
+
 // The tiles of a map: whoever comes late gets all that were written, not only the last.
 TEST(Dds, WhoComesLateHearsAllThatIsLatched) {
   constexpr int kTiles = 10;
@@ -226,7 +241,7 @@ TEST(Dds, BigCloudsComeInAndPosesComeOut) {
   std::string parent, child;
   Heard<PoseWithCovarianceStamped> heard("/revisit/pose", Quality::kReliable, [&](const auto& message) {
     const auto& p = message.pose.pose.position;
-    poses[std::int64_t{message.header.stamp.sec} * 1'000'000'000 + message.header.stamp.nanosec] = {p.x, p.y, p.z};
+    poses[to_ns(message.header.stamp)] = {p.x, p.y, p.z};
   });
   Heard<TfMessage> tf("/tf", Quality::kReliable, [&](const auto& message) {
     parent = message.transforms._buffer[0].header.frame_id;
@@ -240,12 +255,7 @@ TEST(Dds, BigCloudsComeInAndPosesComeOut) {
   const Writer<PointCloud2> clouds(participant(), "/points", Quality::kReliable);  // as most drivers
   const Writer<OdometryMessage> odometry(participant(), "/odom", Quality::kReliable);
   const Writer<TfMessage> tf_static(participant(), "/tf_static", Quality::kLatched);
-  geometry_msgs_msg_dds__TransformStamped_ mounted{
-      {time_of(kStart_ns), text("base_link")}, text("lidar"), {{1.0, 0.0, 1.5}, {0.0, 0.0, 0.0, 1.0}}};
-  TfMessage frames{};
-  frames.transforms._length = frames.transforms._maximum = 1;
-  frames.transforms._buffer = &mounted;
-  tf_static.write(frames);
+  say_where_the_lidar_is(tf_static);
   ASSERT_TRUE(diagnostics.wait_for(1)) << "the node is there";
   std::this_thread::sleep_for(500ms);
 
@@ -271,6 +281,154 @@ TEST(Dds, BigCloudsComeInAndPosesComeOut) {
   for (const auto& [stamp_ns, position] : poses) {
     const int i = static_cast<int>((stamp_ns - kStart_ns) / 100'000'000);
     EXPECT_LT((position - Eigen::Vector3d(0.6 * i, 0.0, 0.0)).norm(), 0.1) << i;
+  }
+}
+
+// Along a road and, in reverse, back beside it, with a small sensor.
+constexpr int kThere = 45, kAll = 2 * kThere;
+Pose pose_of(int i) {
+  return i < kThere ? SyntheticWorld::at(-20.0 + 0.8 * i, 0.0, 0.0)
+                    : SyntheticWorld::at(15.2 - 0.8 * (i - kThere), 0.3, 0.0);
+}
+Scan scan_of(int i) {
+  static const SyntheticWorld world(61);
+  return world.scan(pose_of(i), {16, 360, -20.0, 6.0}, static_cast<unsigned>(i));
+}
+std::int64_t stamp_of(int i) { return kStart_ns + 100'000'000LL * i; }
+int scan_at(const builtin_interfaces_msg_dds__Time_& time) {
+  return static_cast<int>((to_ns(time) - kStart_ns) / 100'000'000);
+}
+Pose to_pose(const geometry_msgs_msg_dds__Pose_& pose) {
+  const auto& [x, y, z, w] = pose.orientation;
+  return Eigen::Translation3d(pose.position.x, pose.position.y, pose.position.z) * Eigen::Quaterniond(w, x, y, z);
+}
+// Sensors send with best effort: so do these clouds. What comes through is answered.
+TEST(Dds, LoopsComeOutAsMessagesOfTwoKinds) {
+  struct Found {
+    int query, match;
+    Pose T_match_query;
+    double probability;
+  };
+  std::vector<Found> loops;
+  std::map<std::int64_t, Pose> poses;  // by stamp
+  Heard<LoopMessage> heard("/revisit/loops", Quality::kReliable, [&](const LoopMessage& message) {
+    EXPECT_STREQ(message.header.frame_id, "lidar");
+    EXPECT_GT(message.t_match_query.covariance[0], 0.0);
+    loops.push_back({scan_at(message.header.stamp), scan_at(message.match_stamp), to_pose(message.t_match_query.pose),
+                     message.probability});
+  });
+  Heard<PoseWithCovarianceStamped> heard_poses("/revisit/loop_poses", Quality::kReliable, [&](const auto& message) {
+    EXPECT_GT(message.pose.covariance[35], 0.0);
+    poses[to_ns(message.header.stamp)] = to_pose(message.pose.pose);
+  });
+  Heard<DiagnosticArray> diagnostics("/diagnostics", Quality::kReliable, [](const auto&) {});
+  Program program(
+      {"--mode", "detect", "--queue", "100", "--set", "retrieval.exclude_s=2", "--set", "retrieval.exclude_frames=20"});
+  const Writer<PointCloud2> clouds(participant(), "/points", Quality::kSensorData);
+  ASSERT_TRUE(diagnostics.wait_for(1)) << "the node is there";
+  std::this_thread::sleep_for(300ms);
+  for (int i = 0; i < kAll; ++i) {
+    const BigCloud cloud(scan_of(i), stamp_of(i));
+    clouds.write(cloud.message);
+    std::this_thread::sleep_for(20ms);
+  }
+  EXPECT_EQ(program.end(), 0);  // which works on what waits
+  ASSERT_TRUE(heard.wait_for(15)) << heard.count();
+  ASSERT_TRUE(heard_poses.wait_for(heard.count()));
+  for (const Found& loop : loops) {
+    const Pose T_match_query = pose_of(loop.match).inverse() * pose_of(loop.query);
+    EXPECT_LT((T_match_query.inverse() * loop.T_match_query).translation().norm(), 0.3) << loop.query;
+    EXPECT_GT(loop.probability, 0.5);
+    ASSERT_EQ(poses.count(stamp_of(loop.query)), 1u);
+    EXPECT_TRUE(poses[stamp_of(loop.query)].isApprox(loop.T_match_query, 1e-12));
+  }
+}
+
+// A map is made, shown to those who ask, and kept with what a receiver said; in it, a pose that somebody gives by hand
+// decides what one scan of a sensor that looks ahead does not.
+TEST(Dds, AMapIsShownAndAnInitialPoseIsTaken) {
+  const std::string map = (fresh_folder() / "map").string();
+  std::vector<std::uint32_t> points, tiles;
+  Heard<PointCloud2> cloud_heard("/revisit/map_cloud", Quality::kLatched, [&](const PointCloud2& cloud) {
+    EXPECT_STREQ(cloud.header.frame_id, "map");
+    EXPECT_EQ(cloud.data._length, 16 * cloud.width);
+    points.push_back(cloud.width);
+  });
+  Heard<PointCloud2> tiles_heard("/revisit/map_tiles", Quality::kLatched,
+                                 [&](const PointCloud2& cloud) { tiles.push_back(cloud.width); });
+  Heard<PathMessage> path("/revisit/path", Quality::kLatched, [](const auto&) {});
+  std::vector<Pose> placed;
+  Heard<PoseWithCovarianceStamped> poses("/revisit/pose", Quality::kReliable,
+                                         [&](const auto& message) { placed.push_back(to_pose(message.pose.pose)); });
+  std::string scans;  // worked on
+  Heard<DiagnosticArray> diagnostics("/diagnostics", Quality::kReliable, [&](const DiagnosticArray& message) {
+    scans = message.status._buffer[0].values._buffer[0].value;
+  });
+  const Writer<PointCloud2> clouds(participant(), "/points", Quality::kReliable);
+  const Writer<NavSatFix> fixes(participant(), "/fix", Quality::kSensorData);
+  const Writer<TfMessage> tf_static(participant(), "/tf_static", Quality::kLatched);
+  const Writer<EmptyMessage> publish(participant(), "/revisit/publish_map", Quality::kReliable);
+  const Writer<PoseWithCovarianceStamped> initial(participant(), "/initialpose", Quality::kReliable);
+  say_where_the_lidar_is(tf_static);
+  const auto wait_for_the_node = [&] {
+    ASSERT_TRUE(diagnostics.wait_for(diagnostics.count() + 1)) << "the node is there";
+    std::this_thread::sleep_for(300ms);
+  };
+  {
+    Program program({"--mode", "slam", "--map", map, "--queue", "100"});
+    wait_for_the_node();
+    for (int i = 0; i < kThere; ++i) {
+      NavSatFix fix{};
+      fix.header = {time_of(stamp_of(i) - 20'000'000), text("gps")};
+      fix.latitude = 48.0 + pose_of(i).translation().y() / 111'000.0;
+      fix.longitude = 8.0 + pose_of(i).translation().x() / 74'000.0;
+      fix.position_covariance[0] = fix.position_covariance[4] = fix.position_covariance[8] = 4.0;
+      fix.position_covariance_type = 2;
+      fixes.write(fix);
+      const BigCloud cloud(scan_of(i), stamp_of(i));
+      clouds.write(cloud.message);
+    }
+    ASSERT_TRUE(poses.wait_for(kThere));
+    publish.write({});
+    ASSERT_TRUE(cloud_heard.wait_for(1));
+    ASSERT_TRUE(tiles_heard.wait_for(1));
+    EXPECT_GT(points[0], 1000u);
+    EXPECT_EQ(program.end(), 0);
+    EXPECT_GE(path.count(), 1u);
+  }
+  const auto store = MapStore::open(MapStore::file_of(map), MapStore::Access::kRead);
+  ASSERT_TRUE(store) << store.error().message;
+  const auto kept = store->fixes();
+  ASSERT_TRUE(kept);
+  ASSERT_GE(kept->size(), 3u) << "one in 10 m";
+  EXPECT_NEAR(kept->front().fix.latitude_deg, 48.0, 1e-4);
+
+  constexpr int kHere = 20;
+  const Pose T_map_lidar = pose_of(0).inverse() * pose_of(kHere);
+  Scan scan = scan_of(kHere);
+  std::erase_if(scan.points, [](const Point& p) { return !(p.x > 0.f && std::abs(p.y) < p.x); });
+  const BigCloud ahead(scan, stamp_of(kHere));
+  for (const bool is_told : {false, true}) {
+    placed.clear(), scans.clear();
+    Program program({"--mode", "localise", "--map", map});
+    wait_for_the_node();
+    if (is_told) {
+      const Pose T_map_base = T_map_lidar * SyntheticWorld::at(1.0, -0.8, 0.2, 0.0) * kTBaseLidar.inverse();
+      const Eigen::Quaterniond q(T_map_base.linear());
+      PoseWithCovarianceStamped message{};
+      message.header = {time_of(stamp_of(kHere)), text("map")};
+      message.pose.pose = {{T_map_base.translation().x(), T_map_base.translation().y(), T_map_base.translation().z()},
+                           {q.x(), q.y(), q.z(), q.w()}};
+      initial.write(message);
+      std::this_thread::sleep_for(300ms);
+    }
+    clouds.write(ahead.message);
+    for (int tries = 0; tries < 20 && scans != "1"; ++tries) (void)diagnostics.wait_for(diagnostics.count() + 1, 1s);
+    EXPECT_EQ(program.end(), 0);
+    ASSERT_EQ(placed.size(), is_told ? 1u : 0u);
+    if (is_told) {
+      EXPECT_LT((T_map_lidar.inverse() * placed[0]).translation().norm(), 0.3);
+    }
   }
 }
 

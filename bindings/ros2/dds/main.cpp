@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A node that speaks to ROS 2 without ROS 2: its topics over Cyclone DDS.
+#include <atomic>
 #include <csignal>
 #include <iostream>
 
@@ -76,8 +77,18 @@ int run(const node::Settings& settings, const Topics& topics, const std::string&
         });
     const Reader<PointCloud2> clouds(participant, topics.points, Quality::kSensorData,
                                      [&](const auto& m) { revisit->add(to_cloud(m)); });
+    // Asked for by a thread of DDS, done by this one: clouds come in meanwhile.
+    std::atomic<bool> is_asked_to_publish = false, is_asked_to_save = false;
+    const Reader<EmptyMessage> publish(participant, name + "/publish_map", Quality::kReliable,
+                                       [&](const auto&) { is_asked_to_publish = true; });
+    const Reader<EmptyMessage> save(participant, name + "/save_map", Quality::kReliable,
+                                    [&](const auto&) { is_asked_to_save = true; });
     std::cerr << "info: waiting for clouds on " << topics.points << '\n';
-    while (is_asked_to_end == 0) dds_sleepfor(DDS_MSECS(50));
+    while (is_asked_to_end == 0) {
+      dds_sleepfor(DDS_MSECS(50));
+      if (is_asked_to_publish.exchange(false)) outlet.log(!revisit->publish_map(message), message);
+      if (is_asked_to_save.exchange(false)) outlet.log(!revisit->save_map("", message), message);
+    }
     if (!revisit->finish(message)) code = 1;
     std::cerr << (code == 0 ? "info: " : "error: ") << message << '\n';
   }
@@ -94,7 +105,9 @@ int main(int argc, char** argv) {
       "Cyclone "
       "DDS. Ctrl-C ends it; the map is settled and closed.");
   app.footer(
-      "Publishes NAME/loops, NAME/pose, NAME/path, /tf and /diagnostics.\n\n"
+      "Publishes NAME/loops, NAME/loop_poses, NAME/pose, NAME/path, /tf and /diagnostics. A std_msgs/Empty on "
+      "NAME/publish_map has the map published (NAME/map_cloud, NAME/map_tiles), one on NAME/save_map has it "
+      "written.\n\n"
       "Example: revisit_dds_node --mode slam --map maps/yard --points /ouster/points --imu /ouster/imu");
   revisit::node::Settings settings;
   Topics topics;

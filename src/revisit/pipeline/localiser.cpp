@@ -246,6 +246,7 @@ Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const Trajecto
                            result.match,
                            result.information,
                            result.probability};
+    result.reason.clear();  // of one scan alone, which may not have been enough
     belief_.clear();
     expected_.reset();
   }
