@@ -4,6 +4,7 @@
 
 usage: node_test.py REVISIT_PROGRAM NODE GENERATED_PYTHON_MESSAGES
 """
+import copy
 import csv
 import math
 import os
@@ -38,6 +39,7 @@ sys.path.insert(0, MESSAGES)
 
 import genpy  # noqa: E402
 import genpy.dynamic  # noqa: E402
+import numpy  # noqa: E402
 import rosbag  # noqa: E402
 import rosgraph  # noqa: E402  (both read the environment)
 import rosnode  # noqa: E402
@@ -46,7 +48,7 @@ import tf2_msgs.msg  # noqa: E402
 import tf2_ros  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from geometry_msgs.msg import PoseWithCovarianceStamped  # noqa: E402
-from nav_msgs.msg import Path  # noqa: E402
+from nav_msgs.msg import Odometry, Path  # noqa: E402
 from nav_msgs.srv import GetMap  # noqa: E402
 from revisit_ros.msg import Loop  # noqa: E402
 from sensor_msgs.msg import PointCloud2  # noqa: E402
@@ -126,7 +128,7 @@ def publish_frames():
 class Node:
     """The node at work, and all that it publishes."""
 
-    def __init__(self, mode, *parameters, map=None):
+    def __init__(self, mode, *parameters, map=None, launch=None):
         self.heard = {topic: [] for topic in TOPICS}
         self.subscribers = [rospy.Subscriber(topic, kind, self.heard[topic].append, queue_size=10000)
                             for topic, kind in TOPICS.items()]
@@ -136,7 +138,10 @@ class Node:
         if map:
             arguments.append(f"_map:={map}")
         self.log = open(os.path.join(WORK, "node.log"), "a+")
-        self.process = subprocess.Popen([NODE, *arguments], stdout=self.log, stderr=subprocess.STDOUT)
+        command = ["roslaunch", "revisit_ros", launch, f"map:={map}"] if launch else [NODE, *arguments]
+        if launch:
+            rospy.set_param("/revisit/retrieval/exclude_s", float(EXCLUDE_S))
+        self.process = subprocess.Popen(command, stdout=self.log, stderr=subprocess.STDOUT)
         wait_until(lambda: all(s.get_num_connections() for s in self.subscribers[:2]) or self.process.poll() is not None)
 
     def last(self, topic):
@@ -162,9 +167,35 @@ class Node:
         return code
 
 
-def play(*options):
-    return subprocess.Popen(["/usr/lib/rosbag/play", "-q", "-r", str(RATE), "-d", "0.5", *options, BAG], stdout=subprocess.DEVNULL,
+def play(*options, bag=BAG):
+    return subprocess.Popen(["/usr/lib/rosbag/play", "-q", "-r", str(RATE), "-d", "0.5", *options, bag], stdout=subprocess.DEVNULL,
                             stderr=subprocess.DEVNULL)
+
+
+def matrix(position, quaternion):
+    """Of a pose: x y z, and x y z w."""
+    v, w = numpy.array(quaternion[:3]), quaternion[3]
+    cross = numpy.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+    T = numpy.eye(4)
+    T[:3, :3] += 2 * w * cross + 2 * cross @ cross
+    T[:3, 3] = position
+    return T
+
+
+def quaternion(T):
+    """x y z w: the eigenvector that belongs to the largest eigenvalue (Bar-Itzhack, 2000)."""
+    R = T[:3, :3]
+    K = numpy.zeros((4, 4))
+    K[:3, :3] = R + R.T - numpy.trace(R) * numpy.eye(3)
+    K[:3, 3] = K[3, :3] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    K[3, 3] = numpy.trace(R)
+    return numpy.linalg.eigh(K)[1][:, 3]
+
+
+def true_poses():
+    with open(BAG + ".poses.tum") as file:
+        rows = [[float(x) for x in line.split()] for line in file if line.strip() and not line.startswith("#")]
+    return [matrix(row[1:4], row[4:8]) for row in rows]
 
 
 def position_of(pose):
@@ -212,6 +243,7 @@ class NodeTest(unittest.TestCase):
         before = node.last("/revisit/pose").header.stamp.to_sec()
         again = Node("slam", map=MAP)
         self.assertEqual(again.process.wait(30), 1, "a map that is there is not overwritten")
+        again.end()
         node = Node("slam", "_resume:=true", map=MAP)
         buffer = tf2_ros.Buffer(rospy.Duration(1000))
         listener = tf2_ros.TransformListener(buffer)
@@ -322,6 +354,40 @@ class NodeTest(unittest.TestCase):
             rospy.delete_param("/use_sim_time")
         self.assertEqual(node.end(signal.SIGTERM), 0)
 
+    def test_9_corrects_fast_lio(self):
+        """A bag with FAST-LIO's topics and frames, whose odometry turns by a tenth of a degree with each scan."""
+        truth = true_poses()
+        turn = matrix((0, 0, 0), (0, 0, math.sin(math.radians(0.05)), math.cos(math.radians(0.05))))
+        odometry = [numpy.eye(4)]
+        for before, after in zip(truth, truth[1:]):
+            odometry.append(odometry[-1] @ numpy.linalg.inv(before) @ after @ turn)
+        bag = os.path.join(WORK, "fast_lio.bag")
+        with rosbag.Bag(bag, "w") as out, rosbag.Bag(BAG) as made:
+            for i, (_, cloud, when) in enumerate(made.read_messages(["/points"])):
+                cloud.header.frame_id = "body"
+                message = Odometry(header=cloud.header, child_frame_id="body")
+                message.header = copy.deepcopy(cloud.header)
+                message.header.frame_id = "camera_init"
+                position, q = message.pose.pose.position, message.pose.pose.orientation
+                position.x, position.y, position.z = odometry[i][:3, 3]
+                q.x, q.y, q.z, q.w = quaternion(odometry[i])
+                out.write("/Odometry", message, when)
+                out.write("/cloud_registered_body", cloud, when)
+        node = Node("slam", map=os.path.join(WORK, "fast_lio"), launch="fast_lio.launch")
+        self.assertEqual(play(bag=bag).wait(60), 0)
+        wait_until(lambda: node.heard["/revisit/pose"] and node.last("/revisit/pose").header.stamp.to_sec() > LAST_S)
+        time.sleep(0.5)
+        corrections = [t for message in node.heard["/tf"] for t in message.transforms]
+        self.assertEqual({(t.header.frame_id, t.child_frame_id) for t in corrections}, {("map", "camera_init")})
+        last = corrections[-1]
+        i = round(10 * last.header.stamp.to_sec())
+        T, r = last.transform.translation, last.transform.rotation
+        seen = matrix((T.x, T.y, T.z), (r.x, r.y, r.z, r.w)) @ odometry[i]
+        driven = numpy.linalg.inv(truth[0]) @ truth[i]
+        self.assertGreater(numpy.linalg.norm(odometry[i][:3, 3] - driven[:3, 3]), 1.0, "odometry alone has drifted")
+        self.assertLess(numpy.linalg.norm(seen[:3, 3] - driven[:3, 3]), 0.3)
+        self.assertEqual(node.end(), 0)
+
     def test_8_launch_files_say_which_nodes_they_start(self):
         folder = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "launch")
         for name in sorted(os.listdir(folder)):
@@ -348,6 +414,15 @@ class NodeTest(unittest.TestCase):
 
 subprocess.run([PROGRAM, "simulate", "--out", BAG, "--world", "warehouse", "--frames", str(SCANS), "--sensor", "vlp16",
                 "--imu", "true", "--gps", "true", "--seed", "5"], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+# As installed, so that roslaunch finds the package and its node.
+HERE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+for folder in ("share/revisit_ros", "lib/revisit_ros"):
+    os.makedirs(os.path.join(WORK, "prefix", folder))
+for name in ("launch", "rviz", "package.xml"):
+    os.symlink(os.path.join(HERE, name), os.path.join(WORK, "prefix/share/revisit_ros", name))
+os.symlink(NODE, os.path.join(WORK, "prefix/lib/revisit_ros/revisit_node"))
+open(os.path.join(WORK, "prefix/.catkin"), "w").close()
+os.environ.update(CMAKE_PREFIX_PATH=os.path.join(WORK, "prefix"), ROS_PACKAGE_PATH=os.path.join(WORK, "prefix/share") + ":/usr/share")
 master = Master()
 try:
     rospy.init_node("test", anonymous=True, disable_signals=True)
