@@ -3,6 +3,7 @@
 #include <sstream>
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <revisit/config/parameter_file.hpp>
 
@@ -12,7 +13,9 @@ namespace revisit {
 namespace {
 
 std::filesystem::path write_file(const std::string& text) {
-  const auto file = std::filesystem::path(testing::TempDir()) / "revisit_parameters.toml";
+  // A file of this process: tests run side by side.
+  const auto file =
+      std::filesystem::path(testing::TempDir()) / ("revisit_parameters_" + std::to_string(::getpid()) + ".toml");
   std::ofstream(file) << text;
   return file;
 }
