@@ -153,6 +153,12 @@ Settings settings_of(const std::string& mode) {
   return settings;
 }
 
+Settings settings_of_new_map() {
+  Settings settings = settings_of("slam");
+  settings.map = (fresh_folder() / "map").string();
+  return settings;
+}
+
 // Sends scans first to last - 1 and waits for all of them.
 std::string drive(const Settings& settings, Listener& listener, int first, int last, bool with_odometry = false) {
   std::string message;
@@ -225,8 +231,7 @@ TEST(Node, SlamSaysWhereOdometryIsInTheMap) {
 }
 
 TEST(Node, SlamGoesOnWhereItWasAndLosesNothing) {
-  Settings settings = settings_of("slam");
-  settings.map = (fresh_folder() / "map").string();
+  Settings settings = settings_of_new_map();
   {
     Listener listener;
     EXPECT_EQ(drive(settings, listener, 0, kThere), "");
@@ -249,8 +254,7 @@ TEST(Node, SlamGoesOnWhereItWasAndLosesNothing) {
 }
 
 TEST(Node, LocaliseAnswersFromASavedMap) {
-  Settings settings = settings_of("slam");
-  settings.map = (fresh_folder() / "map").string();
+  Settings settings = settings_of_new_map();
   Listener ignored;
   EXPECT_EQ(drive(settings, ignored, 0, kThere), "");
   settings.mode = "localise";
@@ -288,8 +292,7 @@ TEST(Node, LocaliseAnswersFromASavedMap) {
 
 // What a sensor that looks ahead sees in one scan does not decide where it is, but with somebody's word it does.
 TEST(Node, AnInitialPoseIsLookedForThere) {
-  Settings settings = settings_of("slam");
-  settings.map = (fresh_folder() / "map").string();
+  Settings settings = settings_of_new_map();
   Listener mapped;
   EXPECT_EQ(drive(settings, mapped, 0, kThere), "");
   settings.mode = "localise";
@@ -324,8 +327,7 @@ TEST(Node, AnInitialPoseIsLookedForThere) {
 }
 
 TEST(Node, FixesOfAReceiverAreKeptWithTheMap) {
-  Settings settings = settings_of("slam");
-  settings.map = (fresh_folder() / "map").string();
+  Settings settings = settings_of_new_map();
   Listener listener;
   std::string message;
   {
@@ -348,8 +350,7 @@ TEST(Node, FixesOfAReceiverAreKeptWithTheMap) {
 }
 
 TEST(Node, ServicesWorkBesideScans) {
-  Settings settings = settings_of("slam");
-  settings.map = (fresh_folder() / "map").string();
+  Settings settings = settings_of_new_map();
   Listener listener;
   std::string message;
   const auto node = Node::make(settings, listener, message);
@@ -411,8 +412,7 @@ TEST(Node, OdometryThatIsNoneIsLeftOut) {
 }
 
 TEST(Node, AStartThatSawNothingIsNoMap) {
-  Settings settings = settings_of("slam");
-  settings.map = (fresh_folder() / "map").string();
+  Settings settings = settings_of_new_map();
   Listener nothing, listener;
   EXPECT_EQ(drive(settings, nothing, 0, 0), "");
   EXPECT_EQ(drive(settings, listener, 0, 5), "");

@@ -368,6 +368,7 @@ TEST(Dds, AMapIsShownAndAnInitialPoseIsTaken) {
   const Writer<NavSatFix> fixes(participant(), "/fix", Quality::kSensorData);
   const Writer<TfMessage> tf_static(participant(), "/tf_static", Quality::kLatched);
   const Writer<EmptyMessage> publish(participant(), "/revisit/publish_map", Quality::kReliable);
+  const Writer<EmptyMessage> save(participant(), "/revisit/save_map", Quality::kReliable);
   const Writer<PoseWithCovarianceStamped> initial(participant(), "/initialpose", Quality::kReliable);
   say_where_the_lidar_is(tf_static);
   const auto wait_for_the_node = [&] {
@@ -393,6 +394,10 @@ TEST(Dds, AMapIsShownAndAnInitialPoseIsTaken) {
     ASSERT_TRUE(cloud_heard.wait_for(1));
     ASSERT_TRUE(tiles_heard.wait_for(1));
     EXPECT_GT(points[0], 1000u);
+    save.write({});
+    const std::filesystem::path written = std::filesystem::path(map) / "map.ply";
+    for (int tries = 0; tries < 1000 && !std::filesystem::exists(written); ++tries) std::this_thread::sleep_for(20ms);
+    EXPECT_TRUE(std::filesystem::exists(written));
     EXPECT_EQ(program.end(), 0);
     EXPECT_GE(path.count(), 1u);
   }
