@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/odometry/local_map.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <stdexcept>
@@ -28,6 +29,8 @@ struct Planes {
   static constexpr std::uint32_t kFewest = 5;  ///< points
   static constexpr float kFlat = 0.1f;         ///< least over middle spread, at most
   static constexpr float kWide = 0.02f;        ///< middle over largest spread, at least: a line has no normal
+  static constexpr float kGuess = 0.1f;        ///< thickness, in voxels, that few points are taken to have,
+  static constexpr float kGuesses = 2.f;       ///< as if so many points had said so
   static constexpr std::uint32_t kMost = 100;  ///< points a voxel; more say nothing new
 };
 
@@ -55,16 +58,23 @@ struct Sums {
   }
   Eigen::Vector3f mean() const { return origin + first / static_cast<float>(count); }
 
-  // The normal of the plane that the points lie on; zero where they lie on none.
-  Eigen::Vector3f normal() const {
-    if (count < Planes::kFewest) return Eigen::Vector3f::Zero();
+  // The plane that the points lie on, if they do, becomes the patch's.
+  void find_plane(Surface::Patch& patch, float voxel_m) const {
+    if (count < Planes::kFewest) return;
     const Eigen::Vector3f centre = first / static_cast<float>(count);
     const Eigen::Matrix3f covariance = second / static_cast<float>(count) - centre * centre.transpose();
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
     solver.computeDirect(covariance);
     const Eigen::Vector3f spread = solver.eigenvalues();
-    if (spread[0] > Planes::kFlat * spread[1] || spread[1] < Planes::kWide * spread[2]) return Eigen::Vector3f::Zero();
-    return solver.eigenvectors().col(0);
+    if (spread[0] > Planes::kFlat * spread[1] || spread[1] < Planes::kWide * spread[2]) return;
+    patch.normal = solver.eigenvectors().col(0);
+    // How far from the plane surfaces are: across it as the points lie, of which a plane's three parameters hide some,
+    // and a voxel away by the tilt, too, in which points along a line leave it.
+    const auto n = static_cast<float>(count);
+    const float guess_m = Planes::kGuess * voxel_m;
+    const float across_m2 =
+        (n * std::max(spread[0], 0.f) + Planes::kGuesses * guess_m * guess_m) / (n - 3.f + Planes::kGuesses);
+    patch.variance_m2 = across_m2 * (1.f + voxel_m * voxel_m / (n * spread[1]));
   }
 };
 
@@ -84,10 +94,11 @@ struct LocalMap::Voxels {
 
   // The surface within a voxel; where its points lie on none, the one that its neighbours' points lie on with them:
   // the lines of a sparse sensor are a voxel apart.
-  void find_surface(const Index& index) {
+  void find_surface(const Index& index, float voxel_m) {
     Voxel& voxel = map.find(index).value();
     voxel.is_stale = false;
-    voxel.patch = {voxel.sums.mean(), voxel.sums.normal()};
+    voxel.patch = {.point = voxel.sums.mean()};
+    voxel.sums.find_plane(voxel.patch, voxel_m);
     if (!voxel.patch.normal.isZero()) return;
     Sums around = voxel.sums;
     for (int k = 0; k < 27; ++k) {
@@ -95,7 +106,7 @@ struct LocalMap::Voxels {
       if (step.isZero()) continue;
       if (const auto found = map.find(index + step); found != map.end()) around.add(found->second.sums);
     }
-    voxel.patch.normal = around.normal();
+    around.find_plane(voxel.patch, voxel_m);
   }
 };
 
@@ -141,7 +152,7 @@ void LocalMap::add(std::span<const Eigen::Vector3f> points) {
     if (!voxel.is_stale) stale.push_back(index);
     voxel.is_stale = true;
   }
-  for (const Index& index : stale) voxels_->find_surface(index);
+  for (const Index& index : stale) voxels_->find_surface(index, voxel_m_);
 }
 
 void LocalMap::forget_far_from(const Eigen::Vector3f& centre) {

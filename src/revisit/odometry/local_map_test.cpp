@@ -39,6 +39,27 @@ TEST(LocalMap, LinesAVoxelApartMakeASurface) {
   EXPECT_NEAR(std::abs(patch.normal.z()), 1.f, 1e-3f);
 }
 
+// A floor, grass of ten centimetres, and a floor of which a single line was seen with a trace of width.
+TEST(LocalMap, SaysHowCertainASurfaceIs) {
+  const auto variance_m2 = [](float height_m, float width_m) {
+    LocalMap map(1.0, 50.0);
+    std::vector<Eigen::Vector3f> points;
+    for (int i = 0; i < 100; ++i) {
+      const auto a = static_cast<float>(i % 10), b = static_cast<float>(i / 10), c = static_cast<float>(7 * i % 10);
+      points.emplace_back(0.05f + 0.1f * a, 0.5f + width_m * (0.1f * b - 0.45f), 0.5f + height_m * (0.1f * c - 0.45f));
+    }
+    map.add(points);
+    Surface::Patch patch;
+    EXPECT_TRUE(map.nearest_patch({0.5f, 0.5f, 0.5f}, 1.f, patch));
+    EXPECT_NEAR(std::abs(patch.normal.z()), 1.f, 0.1f);
+    return patch.variance_m2;
+  };
+  const float floor_m2 = variance_m2(0.01f, 1.f);
+  EXPECT_GT(floor_m2, 0.f);
+  EXPECT_GT(variance_m2(0.2f, 1.f), 5.f * floor_m2);
+  EXPECT_GT(variance_m2(0.01f, 0.2f), 1.2f * floor_m2);
+}
+
 TEST(LocalMap, WhatIsNoSurfaceGivesNone) {
   LocalMap map(1.0, 50.0);
   std::vector<Eigen::Vector3f> corners;

@@ -28,6 +28,7 @@ struct Matching {
   static constexpr double kSettled_m = 2e-3;
   static constexpr double kLeastSeen = 1e-3;  ///< a point in a thousand that faces a direction (IcpOptions)
   static constexpr double kSteady_m = 0.02;   ///< rocking between two voxels counts as converged
+  static constexpr double kNoise_m = 0.03;    ///< of points, where patches count by their variance
   static constexpr double kFineVoxels = 0.3, kFine_m = 0.1;  ///< narrowest kernel: so many voxels and so much more
   static constexpr double kTurnsTried_deg[] = {0.0, 5.0, -5.0, 10.0, -10.0};  ///< where the prediction failed
   static constexpr std::size_t kFew = 1000;  ///< points of a scan, about, with which these are tried
@@ -174,7 +175,8 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
                                .fine_m = std::min(width_m, fine_m()),
                                .least_reach_m = map_->voxel_m(),
                                .settled_m = Matching::kSettled_m,
-                               .least_seen = Matching::kLeastSeen});
+                               .least_seen = Matching::kLeastSeen,
+                               .noise_m = has_rings_ ? Matching::kNoise_m : 0.0});
     icp.converged = icp.converged || (icp.information(0, 0) > 0.0 && icp.last_step_m < Matching::kSteady_m);
     return icp;
   };

@@ -36,6 +36,7 @@ struct Equations {
   Matrix6 H = Matrix6::Zero();
   Vector6 g = Vector6::Zero();
   double weights = 0.0, weighted_squares_m2 = 0.0;
+  double certain = 0.0;  ///< sum of what is in H: weights, less for uncertain patches
   std::size_t pairs = 0;
 
   // The Geman-McClure weight of a squared residual.
@@ -49,6 +50,7 @@ struct Equations {
     H += other.H;
     g += other.g;
     weights += other.weights;
+    certain += other.certain;
     weighted_squares_m2 += other.weighted_squares_m2;
     pairs += other.pairs;
   }
@@ -90,9 +92,18 @@ class Met {
   std::vector<Surface::Patch> patches_;
 };
 
+// What a patch counts for (IcpOptions::noise_m).
+double share_of(const Surface::Patch& patch, double noise_m) {
+  if (noise_m <= 0.0) return 1.0;
+  const double squared_m2 = noise_m * noise_m;
+  return squared_m2 / (squared_m2 + static_cast<double>(patch.variance_m2));
+}
+
 // Points [begin, end) of the source in steps of `stride`, at kernel width `width_m`.
-Equations equations_of(const Surface& target, Points source, Points source_normals, std::size_t begin, std::size_t end,
-                       std::size_t stride, double width_m, double reach_m, const Pose& T, Met& met) {
+Equations equations_of(const Surface& target, Points source, const IcpOptions& options, std::size_t begin,
+                       std::size_t end, std::size_t stride, double width_m, double noise_m, const Pose& T, Met& met) {
+  const Points source_normals = options.source_normals;
+  const double reach_m = std::max(width_m, options.least_reach_m);
   Equations sum;
   const auto reach2 = static_cast<float>(reach_m * reach_m);
   const double shrink = width_m * width_m / 4.0;
@@ -106,9 +117,10 @@ Equations equations_of(const Surface& target, Points source, Points source_norma
       Vector6 J;
       J << n, (p - T.translation()).cross(n);
       const double residual = n.dot(d);
-      const double weight = sum.weigh(residual * residual, shrink);
+      const double weight = sum.weigh(residual * residual, shrink) * share_of(*patch, noise_m);
       sum.H.noalias() += (weight * J) * J.transpose();
       sum.g += weight * residual * J;
+      sum.certain += weight;
     } else {
       const Eigen::Matrix3d metric = plane_to_plane(n, T.linear() * source_normals[i].cast<double>());
       Eigen::Matrix<double, 3, 6> J;
@@ -116,6 +128,7 @@ Equations equations_of(const Surface& target, Points source, Points source_norma
       const double weight = sum.weigh(d.dot(metric * d), shrink);
       sum.H.noalias() += weight * J.transpose() * metric * J;
       sum.g.noalias() += weight * J.transpose() * (metric * d);
+      sum.certain += weight;
     }
     ++sum.pairs;
   }
@@ -137,15 +150,15 @@ Vector6 seen_part(const Vector6& xi, const Equations& sum, double least_seen) {
   Vector6 scale;
   scale << Eigen::Vector3d::Ones(), Eigen::Vector3d::Constant(Steps::kArm_m);
   const Matrix6 per_point = scale.cwiseInverse().asDiagonal() * sum.H * scale.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix6> axes(per_point / sum.weights);
+  const Eigen::SelfAdjointEigenSolver<Matrix6> axes(per_point / sum.certain);
   const Vector6 along = axes.eigenvectors().transpose() * scale.cwiseProduct(xi);
   const Vector6 seen = (axes.eigenvalues().array() < least_seen).select(Vector6::Zero(), along);
   return scale.cwiseInverse().cwiseProduct(axes.eigenvectors() * seen);
 }
 
 // One Gauss-Newton step; false where the points do not fix the pose.
-bool step(const Surface& target, Points source, const IcpOptions& options, double width_m, Met& met, IcpResult& result,
-          double& moved) {
+bool step(const Surface& target, Points source, const IcpOptions& options, double width_m, double noise_m, Met& met,
+          IcpResult& result, double& moved) {
   Pose& T = result.T_target_source;
   // While the kernel is wide, some of the points give the step as well as all.
   const std::size_t stride = width_m > Steps::kAllPointsBelow_m ? 4 : 1;
@@ -153,8 +166,7 @@ bool step(const Surface& target, Points source, const IcpOptions& options, doubl
   Equations sum = tbb::parallel_deterministic_reduce(
       tbb::blocked_range<std::size_t>(0, source.size(), Steps::kPointsATask * stride), Equations{},
       [&](const tbb::blocked_range<std::size_t>& range, Equations part) {
-        part.add(equations_of(target, source, options.source_normals, range.begin(), range.end(), stride, width_m,
-                              std::max(width_m, options.least_reach_m), T, met));
+        part.add(equations_of(target, source, options, range.begin(), range.end(), stride, width_m, noise_m, T, met));
         return part;
       },
       [](Equations a, const Equations& b) {
@@ -167,7 +179,7 @@ bool step(const Surface& target, Points source, const IcpOptions& options, doubl
     result.met = share * static_cast<double>(sum.pairs);
   }
   if (sum.pairs < Steps::kFewestPairs) return false;
-  result.information = information_of(sum, T);
+  if (noise_m <= 0.0) result.information = information_of(sum, T);
   sum.H.diagonal().array() += 1e-6 * sum.H.diagonal().maxCoeff();  // a direction that nothing sees stays where it was
   Vector6 xi = sum.H.ldlt().solve(-sum.g);
   if (options.least_seen > 0.0) xi = seen_part(xi, sum, options.least_seen);
@@ -186,16 +198,18 @@ IcpResult align_icp(const Surface& target, std::span<const Eigen::Vector3f> sour
   IcpResult result;
   result.T_target_source = T_guess_target_source;
   double width_m = options.coarse_m;
+  double noise_m = 0.0;  // at first all count alike, who see farther together
   Met met(source.size());
   for (; result.iterations < options.most_iterations; ++result.iterations) {
     double moved = 0.0;
     result.converged = false;
-    if (!step(target, source, options, width_m, met, result, moved)) break;
+    if (!step(target, source, options, width_m, noise_m, met, result, moved)) break;
     result.last_step_m = moved;
     const bool fine = width_m <= options.fine_m;
     if (fine && result.matched < options.least_matched) break;
     result.converged = fine && moved < Steps::kToAndFro_m;
-    if (fine && moved < options.settled_m) break;
+    if (fine && moved < options.settled_m && noise_m == options.noise_m) break;
+    if (result.converged) noise_m = options.noise_m;
     if (moved < Steps::kSteady * width_m) width_m = std::max(options.fine_m, width_m * Steps::kShrink);
   }
   return result;

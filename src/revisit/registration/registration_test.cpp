@@ -206,6 +206,34 @@ TEST(Icp, OfAScanWithItselfIsTheIdentity) {
   EXPECT_NEAR(agreement.rmse_m, 0.0, 1e-9);
 }
 
+// A level floor on one side, on the other something vague that leans by two degrees.
+class FloorAndHedge final : public Surface {
+ public:
+  bool nearest_patch(const Eigen::Vector3f& query, float, Patch& patch) const override {
+    patch = {.point = {query.x(), query.y(), 0.f}, .normal = Eigen::Vector3f::UnitZ()};
+    if (query.y() < 0.f) return true;
+    constexpr float kSlope = 0.035f;
+    patch.point.z() = kSlope * query.x();
+    patch.normal = Eigen::Vector3f(-kSlope, 0.f, 1.f).normalized();
+    patch.variance_m2 = 0.04f;
+    return true;
+  }
+};
+
+TEST(Icp, WhatIsUncertainCountsForLess) {
+  std::vector<Eigen::Vector3f> level;
+  for (int i = 0; i < 400; ++i)
+    level.emplace_back(static_cast<float>(i % 20 - 10), static_cast<float>(i / 20) - 9.5f, 0.f);
+  const auto tilt_deg = [&](double noise_m) {
+    const IcpResult result =
+        align_icp(FloorAndHedge(), level, Pose::Identity(), {.coarse_m = 1.0, .least_seen = 0.01, .noise_m = noise_m});
+    EXPECT_TRUE(result.converged);
+    return to_degrees(rotation_angle(result.T_target_source));
+  };
+  EXPECT_GT(tilt_deg(0.0), 0.7);
+  EXPECT_LT(tilt_deg(0.03), 0.2);
+}
+
 TEST(Agreement, WallsThatTheOtherScanSawThroughCount) {
   // The same room, once with a wall across it, which stands where the other scan saw the far side.
   const auto room = [](bool with_wall) {

@@ -11,8 +11,9 @@ class Surface {
   struct Patch {
     Eigen::Vector3f point = Eigen::Vector3f::Zero();
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< of unit length, sign arbitrary; zero where it is not known
+    float variance_m2 = 0.f;  ///< of how far surfaces there lie from its plane; 0 where it is not known
 
-    void archive(auto& fields) { fields(point, normal); }
+    void archive(auto& fields) { fields(point, normal, variance_m2); }
   };
 
   Surface() = default;

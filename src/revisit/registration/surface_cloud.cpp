@@ -110,7 +110,7 @@ std::optional<SurfaceCloud::Neighbour> SurfaceCloud::nearest(const Eigen::Vector
 bool SurfaceCloud::nearest_patch(const Eigen::Vector3f& query, float squared_reach_m2, Patch& patch) const {
   const auto found = nearest(query, squared_reach_m2);
   if (!found) return false;
-  patch = {cloud_.points[found->index], normals_[found->index]};
+  patch = {.point = cloud_.points[found->index], .normal = normals_[found->index]};
   return true;
 }
 
