@@ -11,6 +11,7 @@ namespace {
 
 struct Following {
   static constexpr int kLostAfter_scans = 5;       ///< without track: what is predicted on is worth nothing any more
+  static constexpr double kLostAfter_s = 5.0;      ///< between two scans, of which the second is not tracked
   static constexpr double kLongestGap_s = 1.0;     ///< between two scans; beyond, their motion says nothing of a sweep
   static constexpr double kTypicalPeriod_s = 0.1;  ///< where stamps do not increase
   /// Prediction error beyond which a sweep was compensated wrongly, and is once more with the motion that was found.
@@ -39,7 +40,8 @@ OdometryStep Odometry::follow(const Scan& scan, const std::optional<Pose>& T_ext
   step.is_connected = step.is_tracked && follows_closely && untracked_ == 0;
   step.segment = segment_;
   untracked_ = step.is_tracked ? 0 : untracked_ + 1;
-  if (source_ == Source::kLidar && untracked_ >= Following::kLostAfter_scans) {
+  const bool was_carried = untracked_ > 0 && has_last_ && stamp_s > last_stamp_s_ + Following::kLostAfter_s;
+  if (source_ == Source::kLidar && (was_carried || untracked_ >= Following::kLostAfter_scans)) {
     step.lost = true;
     ++segment_;
     matcher_.restart();

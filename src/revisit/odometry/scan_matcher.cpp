@@ -33,9 +33,10 @@ struct Matching {
   static constexpr double kTurnsTried_deg[] = {0.0, 5.0, -5.0, 10.0, -10.0};  ///< where the prediction failed
   static constexpr std::size_t kFew = 1000;  ///< points of a scan, about, with which these are tried
 
-  static constexpr double kFewestMatched = 0.3;  ///< share of the points of a scan that is tracked
-  static constexpr double kBelowTypical = 0.2;   ///< what it may fall below the running mean
-  static constexpr double kOfTypical = 0.7;      ///< share of a running mean that is low itself, of a sparse sensor
+  static constexpr double kFewestMatched = 0.3;     ///< share of the points of a scan that is tracked
+  static constexpr double kBelowTypical = 0.2;      ///< what it may fall below the running mean
+  static constexpr double kBelowUnpredicted = 0.1;  ///< the same, where nothing says what was driven since
+  static constexpr double kOfTypical = 0.7;         ///< share of a running mean that is low itself, of a sparse sensor
   // Scans slide along what hardly fixes them, a wall or a corridor. There, what carries a sensor brakes and jolts no
   // harder than this.
   static constexpr double kHardlyFixed = 0.1;  ///< share of all that fixes the position
@@ -135,11 +136,11 @@ double ScanMatcher::search_radius_m() const {
                     Matching::kFarSearch_m);
 }
 
-bool ScanMatcher::is_credible(double matched, double met) const {
-  if (scans_ < Matching::kFirstScans)
+bool ScanMatcher::is_credible(double matched, double met, bool is_predicted) const {
+  if (is_predicted && scans_ < Matching::kFirstScans)
     return matched >= Matching::kFewestMatchedAtFirst && matched >= Matching::kFittingAtFirst * met;
   return matched >= std::max(std::min(Matching::kFewestMatched, Matching::kOfTypical * typical_match_),
-                             typical_match_ - Matching::kBelowTypical);
+                             typical_match_ - (is_predicted ? Matching::kBelowTypical : Matching::kBelowUnpredicted));
 }
 
 ScanMatch ScanMatcher::match(double stamp_s, const MatcherScan& scan, const std::optional<Pose>& T_previous_lidar,
@@ -195,8 +196,9 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
     return slid_m(icp.information, surprise.translation()) <=
            Matching::kJolt_m + 0.5 * Matching::kMostAcceleration_mps2 * untracked_s * untracked_s;
   };
+  const bool is_predicted = measured_m || untracked_s <= Matching::kLongestExtrapolation_s;
   const auto fits = [&](const IcpResult& icp) {
-    return icp.converged && is_credible(icp.matched, icp.met) && is_possible(icp);
+    return icp.converged && is_credible(icp.matched, icp.met, is_predicted) && is_possible(icp);
   };
   IcpResult icp = align(radius_m, T_predicted);
   if (!is_possible(icp)) icp = align(std::min(radius_m, Matching::kNarrowSearch_m), T_predicted);

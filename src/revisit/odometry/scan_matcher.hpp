@@ -91,7 +91,7 @@ class ScanMatcher {
                          std::optional<double> measured_m) const;
   double fine_m() const;
   double search_radius_m() const;
-  bool is_credible(double matched, double met) const;
+  bool is_credible(double matched, double met, bool is_predicted) const;
 
   Resolution resolution_;
   std::unique_ptr<LocalMap> map_;

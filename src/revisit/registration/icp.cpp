@@ -25,6 +25,7 @@ struct Steps {
   static constexpr double kToAndFro_m = 0.01;  ///< the same, where neighbours change to and fro: converged
   static constexpr double kAcross = 1e-3;      ///< covariance across a plane, 1 along it (Segal et al., RSS 2009)
   static constexpr double kArm_m = 10.0;       ///< at which turns are weighed against translations
+  static constexpr int kMostTilts = 10;        ///< steps of height and tilt alone
   // Points share the errors of the surfaces that they lie on, so that they count for fewer than they are.
   static constexpr double kPointsThatCountAsOne = 10.0, kLeastNoise_m = 0.02;
 };
@@ -156,6 +157,21 @@ Vector6 seen_part(const Vector6& xi, const Equations& sum, double least_seen) {
   return scale.cwiseInverse().cwiseProduct(axes.eigenvectors() * seen);
 }
 
+// Rings of beams turn about the source's z axis: the patches that they make of one scan stand still along these three
+// directions, and along these alone.
+Eigen::Matrix<double, 6, 3> height_and_tilt(const Eigen::Matrix3d& rotation) {
+  Eigen::Matrix<double, 6, 3> axes = Eigen::Matrix<double, 6, 3>::Zero();
+  axes.block<3, 1>(0, 0) = rotation.col(2);
+  axes.bottomRightCorner<3, 2>() = rotation.leftCols<2>();
+  return axes;
+}
+
+Vector6 solution(const Equations& sum, const Pose& T, double noise_m) {
+  if (noise_m <= 0.0) return sum.H.ldlt().solve(-sum.g);
+  const Eigen::Matrix<double, 6, 3> axes = height_and_tilt(T.linear());
+  return axes * Eigen::Matrix3d(axes.transpose() * sum.H * axes).ldlt().solve(-axes.transpose() * sum.g);
+}
+
 // One Gauss-Newton step; false where the points do not fix the pose.
 bool step(const Surface& target, Points source, const IcpOptions& options, double width_m, double noise_m, Met& met,
           IcpResult& result, double& moved) {
@@ -179,9 +195,9 @@ bool step(const Surface& target, Points source, const IcpOptions& options, doubl
     result.met = share * static_cast<double>(sum.pairs);
   }
   if (sum.pairs < Steps::kFewestPairs) return false;
-  if (noise_m <= 0.0) result.information = information_of(sum, T);
+  result.information = information_of(sum, T);
   sum.H.diagonal().array() += 1e-6 * sum.H.diagonal().maxCoeff();  // a direction that nothing sees stays where it was
-  Vector6 xi = sum.H.ldlt().solve(-sum.g);
+  Vector6 xi = solution(sum, T, noise_m);
   if (options.least_seen > 0.0) xi = seen_part(xi, sum, options.least_seen);
   if (!xi.allFinite()) return false;
   const Pose small = small_motion(xi);
@@ -198,19 +214,25 @@ IcpResult align_icp(const Surface& target, std::span<const Eigen::Vector3f> sour
   IcpResult result;
   result.T_target_source = T_guess_target_source;
   double width_m = options.coarse_m;
-  double noise_m = 0.0;  // at first all count alike, who see farther together
   Met met(source.size());
   for (; result.iterations < options.most_iterations; ++result.iterations) {
     double moved = 0.0;
     result.converged = false;
-    if (!step(target, source, options, width_m, noise_m, met, result, moved)) break;
+    if (!step(target, source, options, width_m, 0.0, met, result, moved)) break;
     result.last_step_m = moved;
     const bool fine = width_m <= options.fine_m;
     if (fine && result.matched < options.least_matched) break;
     result.converged = fine && moved < Steps::kToAndFro_m;
-    if (fine && moved < options.settled_m && noise_m == options.noise_m) break;
-    if (result.converged) noise_m = options.noise_m;
+    if (fine && moved < options.settled_m) break;
     if (moved < Steps::kSteady * width_m) width_m = std::max(options.fine_m, width_m * Steps::kShrink);
+  }
+  // Whether it converged is known before: all count alike until then, who see farther together.
+  if (options.noise_m > 0.0 && result.converged) {
+    IcpResult tilted = result;
+    double moved = options.settled_m;
+    for (int i = 0; i < Steps::kMostTilts && moved >= options.settled_m; ++i)
+      if (!step(target, source, options, width_m, options.noise_m, met, tilted, moved)) return result;
+    result.T_target_source = tilted.T_target_source;
   }
   return result;
 }

@@ -31,9 +31,9 @@ struct IcpOptions {
   /// Directions in which the surfaces' normals have on average a smaller square share than this stay as guessed: along
   /// a bare corridor normals are noise. Turns count as the motion of a point 10 m away.
   double least_seen = 0.0;
-  /// Point-to-plane, where above 0: the noise of points (standard deviation), to which the variance of a patch is
-  /// added; pairs count by the inverse of both. Otherwise all patches count alike, hedges and crowns as walls and
-  /// ground.
+  /// Point-to-plane, where above 0: once settled, height, roll and pitch along the source's axes settle again with each
+  /// pair weighed by the noise of points (this, a standard deviation) and the variance of its patch. Only they: along
+  /// the ground a lorry beside is as certain as any wall.
   double noise_m = 0.0;
   /// Normals of the source, one a point: plane-to-plane (generalised ICP, Segal et al., RSS 2009, with the covariances
   /// of planes); empty: point-to-plane.
