@@ -5,6 +5,7 @@
 #include <optional>
 #include <thread>
 #include <tuple>
+#include <vector>
 
 #include <revisit/core/stopwatch.hpp>
 #include <revisit/core/text.hpp>
@@ -150,7 +151,7 @@ void count(RunFile& run, const SlamStep& step) {
 }
 
 Status run_all(Slam& slam, const Recording& recording, const OtherOdometry& odometry, double sweep_s,
-               EvidenceFile& evidence, RunFile& run) {
+               std::vector<EvidenceFile>& evidence, RunFile& run) {
   std::size_t first = 0;
   if (const auto last = slam.last_frame()) {
     while (first < recording.size() && recording.frame(first) <= *last) ++first;
@@ -167,8 +168,8 @@ Status run_all(Slam& slam, const Recording& recording, const OtherOdometry& odom
     const auto step = scan ? slam.process(*std::move(scan), odometry(i)) : Result<SlamStep>(scan.error());
     if (step) {
       count(run, *step);
-      if (step->detection)
-        if (const Status status = evidence.add(*step->detection); !status) return status;
+      for (EvidenceFile& file : evidence)
+        if (const Status status = step->detection ? file.add(*step->detection) : ok(); !status) return status;
     } else if (slam.has_failed()) {
       return step.error();
     } else {
@@ -311,7 +312,14 @@ int slam(const SlamOptions& options) {
   if (!writer) return fail(writer.error());
   if (std::error_code failure; !options.resume && fs::exists(out / "tiles" / "tileset.json", failure))
     fs::remove_all(out / "tiles", failure);  // of another map
-  EvidenceFile evidence(out, slam->last_frame());
+  std::vector<EvidenceFile> evidence;
+  evidence.emplace_back(out, slam->last_frame());
+  const fs::path map_file = options.into.empty() ? fs::path() : MapStore::file_of(options.into);
+  if (map_file.filename() == MapStore::kFileName) {
+    const auto last = slam->last_frame();
+    const FrameId before{in_map(slam->session(), last.value_or(FrameId{0})).value - (last ? 0 : 1)};
+    evidence.push_back(EvidenceFile::of_map(map_file.parent_path(), before));
+  }
   const auto viewer = options.is_viewed ? look_at(options.into.empty() ? out : fs::path(options.into))
                                         : Result<std::unique_ptr<ViewServer>>(nullptr);
   if (!viewer) return fail(viewer.error());

@@ -10,6 +10,7 @@
 #include "common.hpp"
 #include "progress.hpp"
 #include "view/page.hpp"
+#include "view/view_report.hpp"
 #include "view/view_server.hpp"
 
 namespace revisit::cli {
@@ -113,7 +114,9 @@ Run add_view(CLI::App& program) {
       ->required();
   command->add_option("--compare", options->other, "Another one, side by side");
   command->add_option("--report", options->report, "Writes the page as one file instead, .html, to send to somebody");
-  command->add_option("--report-mb", options->report_mb, "Points in that file, at most, MB: the coarsest come first")
+  command
+      ->add_option("--report-mb", options->report_mb,
+                   "Points in that file, at most, MB: the coarsest of the map, and the scans of loops")
       ->check(CLI::Range(0.0, 500.0));
   command->add_option("--host", options->host,
                       "Where to listen; for others than this machine a token is made, which the address then has");

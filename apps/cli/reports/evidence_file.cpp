@@ -36,14 +36,21 @@ EvidenceFile::EvidenceFile(const std::filesystem::path& folder, std::optional<Fr
                "distance_m,least_fixed,voxel_m,inliers,log_odds,tx,ty,tz,qx,qy,qz,qw\n";
 }
 
+EvidenceFile EvidenceFile::of_map(const std::filesystem::path& folder, FrameId last) {
+  EvidenceFile file(folder, last);
+  file.is_of_map_ = true;
+  return file;
+}
+
 Status EvidenceFile::add(const Detection& detection) {
   for (const Detection::Registered& each : detection.registered) {
-    if (session_of(each.match) != session_of(detection.frame)) continue;
+    if (!is_of_map_ && session_of(each.match) != session_of(detection.frame)) continue;
+    const auto numbered = [this](FrameId frame) { return is_of_map_ ? frame.value : in_recording(frame).value; };
     const LoopEvidence& e = each.evidence.evidence;
     const Eigen::Vector3d t = each.evidence.T_match_query.translation();
     const Eigen::Quaterniond q(each.evidence.T_match_query.rotation());
-    stream_ << in_recording(detection.frame).value << ',' << in_recording(each.match).value << ',' << e.inlier_ratio
-            << ',' << e.inlier_share << ',' << e.free_space_agreement << ',';
+    stream_ << numbered(detection.frame) << ',' << numbered(each.match) << ',' << e.inlier_ratio << ','
+            << e.inlier_share << ',' << e.free_space_agreement << ',';
     if (e.intensity_agreement) stream_ << *e.intensity_agreement;
     for (const double value :
          {e.rmse_m, e.overlap, e.distance_m, e.least_fixed, e.voxel_m, static_cast<double>(e.inliers),

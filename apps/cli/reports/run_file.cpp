@@ -57,8 +57,12 @@ Result<RunFacts> read_run(const std::filesystem::path& file) {
     facts.input = document.value("input", "");
     facts.topic = document.value("topic", "");
     facts.database = document.value("database", "");
+    facts.calibration = document.value("calibration", "");
     facts.interrupted = document.value("interrupted", false);
     const auto parameters = document.value("parameters", nlohmann::json::object());
+    for (const auto& [name, value] : parameters.items())
+      static_cast<void>(
+          set_parameter(facts.parameters, name, value.is_string() ? value.get<std::string>() : value.dump()));
     if (parameters.contains("retrieval.exclude_frames"))
       facts.exclude_frames = parameters.at("retrieval.exclude_frames").get<int>();
     if (parameters.contains("retrieval.exclude_s"))

@@ -31,9 +31,10 @@ struct RunFile {
 
 Status write_run(const std::filesystem::path& file, const RunFile& run);
 
-/// What `evaluate` needs of a run; absent entries where the file does not have them.
+/// What later commands need of a run; absent entries where the file does not have them.
 struct RunFacts {
-  std::string input, topic, database;
+  std::string input, topic, database, calibration;
+  Parameters parameters;  ///< defaults where the file says nothing, or what this version does not know
   bool interrupted = false;
   std::optional<int> exclude_frames;
   std::optional<double> exclude_s;

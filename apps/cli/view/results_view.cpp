@@ -83,7 +83,11 @@ Result<const Recording*> ResultsView::recording() {
     if (!run) return run.error();
     auto opened = open_input(run->input, {.topic = run->topic});
     if (!opened) return opened.error();
+    auto calibration = load_calibration(run->calibration);
+    if (!calibration) return calibration.error();
     recording_ = *std::move(opened);
+    parameters_ = run->parameters;
+    calibration_ = *calibration;
   }
   return recording_.get();
 }
@@ -135,7 +139,7 @@ Result<std::optional<IntensityScanContext>> ResultsView::descriptor(FrameId fram
   if (!scan) return scan.error();
   const auto scale = intensity_scale_of(**source, parameters_.intensity);
   if (!scale) return scale.error();
-  auto prepared = prepare_scan(*std::move(scan), parameters_, *scale, IntensityCalibration{});
+  auto prepared = prepare_scan(*std::move(scan), parameters_, *scale, calibration_);
   if (!prepared) return prepared.error();
   return std::optional(std::move(prepared->descriptor));
 }

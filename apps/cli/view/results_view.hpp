@@ -11,6 +11,7 @@
 #include <vector>
 
 #include <revisit/config/parameters.hpp>
+#include <revisit/core/intensity_calibration.hpp>
 #include <revisit/core/result.hpp>
 #include <revisit/core/scan.hpp>
 #include <revisit/descriptors/intensity_scan_context.hpp>
@@ -57,7 +58,8 @@ class ResultsView {
   std::filesystem::path temporary_;        ///< empty where there is none
   std::shared_ptr<const MapStore> store_;  ///< for points and descriptors
   std::unique_ptr<Recording> recording_;
-  Parameters parameters_;
+  Parameters parameters_;             ///< of the run, once its recording is open
+  IntensityCalibration calibration_;  ///< likewise
 };
 
 }  // namespace revisit::cli

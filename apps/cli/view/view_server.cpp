@@ -5,10 +5,6 @@
 #include <charconv>
 #include <chrono>
 #include <cstdint>
-#include <cstdlib>
-#include <fstream>
-#include <iterator>
-#include <map>
 #include <optional>
 #include <string_view>
 #include <thread>
@@ -18,6 +14,7 @@
 #include <nlohmann/json.hpp>
 
 #include "view/page.hpp"
+#include "view/view_files.hpp"
 
 namespace revisit::cli {
 namespace {
@@ -65,31 +62,6 @@ bool has_token(const Request& request, const std::string& token) {
   const std::string cookies = request.get_header_value("Cookie"), name = "revisit_token=";
   const std::size_t at = cookies.find(name);
   return at != std::string::npos && is_same(cookies.substr(at + name.size(), token.size()), token);
-}
-
-std::string bytes_of(const std::vector<Point>& points) {
-  return {reinterpret_cast<const char*>(points.data()), points.size() * sizeof(Point)};
-}
-
-std::string to_json(const IntensityScanContext& descriptor) {
-  nlohmann::json rows = {
-      {"rings", descriptor.rings}, {"sectors", descriptor.sectors}, {"intensity", descriptor.intensity}};
-  auto& occupied = rows["occupied"] = nlohmann::json::array();
-  for (int sector = 0; sector < descriptor.sectors; ++sector)
-    for (int ring = 0; ring < descriptor.rings; ++ring) occupied.push_back(descriptor.occupied(ring, sector) ? 1 : 0);
-  return rows.dump();
-}
-
-// A file of the tileset, and no other, wherever links may lead.
-std::optional<std::string> tile(const fs::path& folder, const std::string& name) {
-  std::error_code failure;
-  const fs::path root = fs::canonical(folder, failure);
-  if (failure) return std::nullopt;
-  const fs::path file = fs::canonical(root / name, failure);
-  if (failure || file.parent_path() != root || !fs::is_regular_file(file, failure)) return std::nullopt;
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) return std::nullopt;
-  return std::string{std::istreambuf_iterator<char>(stream), {}};
 }
 
 std::optional<FrameId> frame_in(const std::string& text) {
@@ -141,7 +113,7 @@ class ViewServer::Implementation {
                   auto* view = view_of(request, response);
                   if (view == nullptr) return;
                   const std::string name = request.matches[2];
-                  auto bytes = tile(view->tiles(), name);
+                  auto bytes = read_tile(view->tiles(), name);
                   if (!bytes) return refuse(response, 404, name + ": not there");
                   response.set_content(*std::move(bytes), name.ends_with(".glb") ? "model/gltf-binary" : kJson);
                 });
@@ -275,92 +247,5 @@ Result<std::unique_ptr<ViewServer>> ViewServer::start(std::vector<std::shared_pt
 }
 
 ViewServer::~ViewServer() = default;
-
-namespace {
-
-std::string to_base64(std::string_view bytes) {
-  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t three = 0;
-    for (std::size_t k = i; k < i + 3; ++k)
-      three = three << 8 | (k < bytes.size() ? static_cast<unsigned char>(bytes[k]) : 0u);
-    for (int k = 0; k < 4; ++k)
-      text += i + static_cast<std::size_t>(k) <= bytes.size() ? kDigits[three >> (18 - 6 * k) & 63] : '=';
-  }
-  return text;
-}
-
-// Texts in a page: "</script>" must not end it.
-std::string embedded(const nlohmann::json& files) {
-  std::string text = files.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace), safe;
-  for (const char c : text) safe += c == '<' ? std::string("\\u003c") : std::string(1, c);
-  return safe;
-}
-
-std::string replaced(std::string text, std::string_view what, std::string_view by) {
-  if (const std::size_t at = text.find(what); at != std::string::npos) text.replace(at, what.size(), by);
-  return text;
-}
-
-// "</script" within the script would end it, too.
-std::string inline_script(std::string_view script) {
-  std::string text(script);
-  for (std::size_t at = text.find("</script"); at != std::string::npos; at = text.find("</script", at + 1))
-    text.replace(at, 2, "<\\/");
-  return text;
-}
-
-// Takes out of a tileset what is not among the files.
-void keep_only(const nlohmann::json& files, nlohmann::json& node) {
-  if (!node.is_object()) return;
-  if (node.contains("content") && !files.contains("a/tiles/" + node["content"].value("uri", ""))) node.erase("content");
-  if (!node.contains("children")) return;
-  auto children = nlohmann::json::array();
-  for (auto& child : node["children"]) {
-    keep_only(files, child);
-    if (child.contains("content") || child.contains("children")) children.push_back(std::move(child));
-  }
-  node.erase("children");
-  if (!children.empty()) node["children"] = std::move(children);
-}
-
-}  // namespace
-
-Result<std::string> view_report(ResultsView& view, std::size_t most_bytes) try {
-  const auto data = view.json();
-  if (!data) return data.error();
-  nlohmann::json files = {{"a/view.json", *data}, {"views.json", R"({"views":1})"}};
-  if (const auto tileset = tile(view.tiles(), "tileset.json")) {
-    auto shown = nlohmann::json::parse(*tileset, nullptr, false);
-    if (shown.is_discarded()) return Error{(view.tiles() / "tileset.json").string() + ": is no JSON"};
-    std::error_code failure;
-    std::map<std::pair<int, std::string>, std::size_t> by_level;  // the coarsest first
-    for (fs::directory_iterator it(view.tiles(), failure), end; !failure && it != end; it.increment(failure))
-      if (const std::string name = it->path().filename(); name.ends_with(".glb"))
-        by_level[{std::atoi(name.c_str()), name}] = it->file_size(failure);
-    std::size_t bytes = 0;
-    for (const auto& [level_and_name, size] : by_level) {
-      if ((bytes += size) > most_bytes) break;
-      const auto content = tile(view.tiles(), level_and_name.second);
-      if (content) files["a/tiles/" + level_and_name.second] = to_base64(*content);
-    }
-    keep_only(files, shown["root"]);
-    files["a/tiles/tileset.json"] = shown.dump();
-  }
-  std::string page(page_html());
-  page = replaced(page, R"(<meta charset="utf-8">)",
-                  R"(<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; connect-src data: blob:; worker-src blob:; base-uri 'none'; form-action 'none'">)");
-  page = replaced(page, R"(<link rel="stylesheet" href="viewer.css">)",
-                  "<style>" + std::string(page_style()) + "</style>");
-  page = replaced(page, R"(<script type="module" src="viewer.js"></script>)",
-                  "<script type=\"application/json\" id=\"files\">" + embedded(files) +
-                      "</script>\n<script type=\"module\">" + inline_script(page_script()) + "</script>");
-  return page;
-} catch (const nlohmann::json::exception& problem) {
-  return Error{(view.tiles() / "tileset.json").string() + ": is no tileset: " + problem.what()};
-}
 
 }  // namespace revisit::cli

@@ -34,7 +34,4 @@ class ViewServer {
   std::string address_;
 };
 
-/// A page in one file, to send to a colleague: the view with the coarsest tiles, up to `most_bytes` of them.
-Result<std::string> view_report(ResultsView& view, std::size_t most_bytes);
-
 }  // namespace revisit::cli

@@ -12,8 +12,8 @@ export const isReport = embedded !== null;
 export async function read(name: string): Promise<Response> {
   if (!embedded) return fetch(name);
   const text = embedded[name];
-  if (text === undefined) return new Response("not in this report", { status: 404 });
-  if (!name.endsWith(".glb")) return new Response(text);
+  if (text === undefined) return new Response("not in this report, which has the scans of its weakest loops; revisit view shows all", { status: 404 });
+  if (!/\.(glb|bin)$/.test(name)) return new Response(text);
   return new Response(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)));
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One loop, or one refused candidate: what was found, and why it was believed or not.
 import { h, number } from "./dom";
-import { isReport } from "./files";
 import { frameName, type Loop, type View } from "./model";
 import { descriptors, overlay } from "./scan_pair";
 
@@ -58,10 +57,6 @@ export class LoopTab {
     }
     const pictures = h("div");
     this.root.replaceChildren(steps, h("h2", {}, `Scan ${frameName(loop.query)} → ${frameName(loop.match)}`), verdict(loop), measures(loop), evidence(loop), pictures);
-    if (isReport) {
-      pictures.append(h("p", { class: "hint" }, "The scans are not in this report; revisit view shows them."));
-      return;
-    }
     const add = async (what: Promise<HTMLElement>, name: string) => {
       const place = h("div", { class: "hint" }, `${name} …`);
       pictures.append(place);

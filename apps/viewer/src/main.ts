@@ -96,7 +96,7 @@ function start(views: View[]) {
     canvas.dataset.drawn = String(stage.drawn);
     canvas.dataset.loading = String(stage.sides.some((side) => side.points?.isLoading));
   };
-  const noTiles = view.command === "detect" ? "No points: revisit slam makes a map." : "No points yet: they come with the finished map.";
+  const noTiles = view.command === "detect" ? "No points: revisit slam makes a map." : "The map so far, thinned; all points come with the finished map.";
   if (!view.has_tiles) say(noTiles);
   if (view.scans.frame.length === 0) say("No trajectory: these results have no poses. The charts show which scans met.");
 
@@ -139,6 +139,7 @@ function start(views: View[]) {
   if (!isReport) listen(stage, say, (now) => {
     summary.textContent = summaryOf(now);
     timeline.update();
+    mapTab.update(now);
     if (now.scans.frame.length > 0) say(now.has_tiles ? "" : noTiles);
   });
 }
@@ -154,7 +155,7 @@ function listen(stage: Stage, say: (text: string) => void, update: (view: View) 
         if (view.has_tiles !== side.view.has_tiles) return location.reload();
         const isFirst = side.view.scans.frame.length === 0;
         side.update(view);
-        if (isFirst) stage.frame(true);
+        if (!stage.isMoved) stage.frame(isFirst || stage.camera === stage.orthographic);  // all of it, while nobody looks elsewhere
       }
       update(stage.sides[0]!.view);
       stage.draw();

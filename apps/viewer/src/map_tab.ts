@@ -16,8 +16,8 @@ function legend(by: ColourBy, view: View, heights: [number, number]): HTMLElemen
   return scale(gradientOf(colours), ends[0]!, ends[1]!);
 }
 
-function scale(colours: string, from: string, to: string): HTMLElement {
-  return h("div", { class: "legend" }, h("span", {}, from), h("i", { style: `background:${colours}` }), h("span", {}, to));
+function scale(colours: string, from: string, to: string | HTMLElement): HTMLElement {
+  return h("div", { class: "legend" }, h("span", {}, from), h("i", { style: `background:${colours}` }), typeof to === "string" ? h("span", {}, to) : to);
 }
 
 const duration_s = ({ scans }: View): number => (scans.stamp_s.at(-1) ?? 0) - (scans.stamp_s[0] ?? 0);
@@ -25,6 +25,7 @@ const duration_s = ({ scans }: View): number => (scans.stamp_s.at(-1) ?? 0) - (s
 export class MapTab {
   readonly root: HTMLElement;
   private readonly legend = h("div");
+  private readonly duration = h("span");
   readonly status = h("p", { class: "hint", id: "drawn" });
   readonly measured = h("p", { id: "measured", class: "figure", "aria-live": "polite" });
   isMeasuring = false;
@@ -50,7 +51,7 @@ export class MapTab {
       slider("Highest shown", low, high, 0.5, high, (value) => uniform("highZ", value === high ? 1e9 : value), " m"),
       toggle("Points", true, (on) => each((side) => side.points && (side.points.group.visible = on))()),
       toggle("Trajectory, coloured by time", true, (on) => each((side) => (side.trajectories.after.visible = on))()),
-      scale(gradientOf("cividis"), "0 s", `${duration_s(view).toFixed(0)} s`),
+      scale(gradientOf("cividis"), "0 s", this.duration),
       has(view.scans.odometry) ? toggle("Odometry, before closing loops", false, (on) => each((side) => (side.trajectories.before.visible = on))()) : null,
       has(view.scans.truth) ? toggle("Truth", false, (on) => each((side) => (side.trajectories.truth.visible = on))()) : null,
       toggle("Loops, coloured by probability", true, (on) => each((side) => (side.loops.group.visible = on))()),
@@ -67,6 +68,12 @@ export class MapTab {
       }),
       this.measured, this.status);
     this.colourBy("height");
+    this.update(view);
+  }
+
+  /** After the view has grown. */
+  update(view: View) {
+    this.duration.textContent = `${duration_s(view).toFixed(0)} s`;
   }
 
   colourBy(by: ColourBy) {

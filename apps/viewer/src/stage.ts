@@ -17,7 +17,7 @@ export class Side {
   constructor(public view: View) {
     this.trajectories = new Trajectories(view);
     this.loops = new LoopLines(view);
-    this.points = view.has_tiles ? new MapPoints(view.name) : null;
+    this.points = view.has_tiles || view.command !== "detect" ? new MapPoints(view) : null;
     this.scan.frustumCulled = false;
     this.robot.renderOrder = 3;
     this.scan.visible = this.robot.visible = false;
@@ -38,6 +38,7 @@ export class Side {
     }
     old.dispose();
     this.loops.update(view);
+    void this.points?.follow(view);
   }
 }
 
@@ -50,6 +51,7 @@ export class Stage {
   sides: Side[] = [];
   drawn = 0;
   onDraw = () => {};
+  isMoved = false;  // by hand, or to a loop
   private isWaiting = false;
   private height = 0;
 
@@ -63,6 +65,7 @@ export class Stage {
     this.controls.screenSpacePanning = false;
     this.controls.maxPolarAngle = 0.495 * Math.PI;
     this.controls.addEventListener("change", () => this.draw());
+    this.controls.addEventListener("start", () => (this.isMoved = true));
     this.controls.listenToKeyEvents(canvas);
     new ResizeObserver(() => this.draw()).observe(canvas);
   }
@@ -84,6 +87,7 @@ export class Stage {
 
   /** All of it: from above, or from a corner. */
   frame(fromAbove: boolean) {
+    this.isMoved = false;
     const box = this.bounds(), middle = box.getCenter(new THREE.Vector3()), size = box.getSize(new THREE.Vector3());
     this.camera = fromAbove ? this.orthographic : this.perspective;
     this.controls.object = this.camera;
@@ -105,6 +109,7 @@ export class Stage {
 
   lookAt(place: Triple) {
     const target = new THREE.Vector3(...place);
+    this.isMoved = true;
     this.camera.position.add(target.clone().sub(this.controls.target));
     this.controls.target.copy(target);
     this.controls.update();

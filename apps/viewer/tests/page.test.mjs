@@ -40,6 +40,42 @@ test("the map is drawn, from above and from a corner", async (context) => {
   await page.getByText("From a corner").click();
   await settle(page);
   await looksLike(page, "map_corner");
+  await page.getByText("From above").click();
+  await settle(page);
+  await looksLike(page, "map_above");
+  assert.deepEqual(page.problems, []);
+});
+
+test("every key does what its button does", async (context) => {
+  const page = await open(context, await serve(context, results()));
+  await settle(page);
+  for (const [key, by] of [["1", "intensity"], ["3", "time"], ["4", "session"], ["2", "height"]]) {
+    await page.keyboard.press(key);
+    assert.equal(await page.locator("select").inputValue(), by);
+  }
+  await page.keyboard.press("c");
+  await settle(page);
+  await looksLike(page, "map_corner");
+  await page.keyboard.press("t");
+  await settle(page);
+  await looksLike(page, "map_above");
+  await page.keyboard.press("n");
+  const first = await text(page, "h2");
+  await page.keyboard.press("n");
+  assert.notEqual(await text(page, "h2"), first);
+  await page.keyboard.press("p");
+  assert.equal(await text(page, "h2"), first);
+  const button = page.getByLabel("Play the drive");
+  for (const sign of ["❚❚", "▶"]) {
+    await page.keyboard.press(" ");
+    assert.equal(await button.innerText(), sign);
+  }
+  await page.keyboard.press(".");
+  const moment = await text(page, "#moment");
+  await page.keyboard.press(".");
+  assert.notEqual(await text(page, "#moment"), moment);
+  await page.keyboard.press(",");
+  assert.equal(await text(page, "#moment"), moment);
   assert.deepEqual(page.problems, []);
 });
 
@@ -87,6 +123,39 @@ test("a loop shows both scans, both descriptors and the evidence", async (contex
   assert.notEqual(await text(page, "h2"), first);
   await page.getByText("◀ Previous").click();
   assert.equal(await text(page, "h2"), first);
+  const picture = page.locator("canvas.picture").first();
+  await picture.waitFor();
+  const before = await picture.screenshot();
+  await check(page, "This scan at its true pose").click();
+  assert.ok(!(await picture.screenshot()).equals(before), "the scan at its true pose is drawn, too");
+  assert.deepEqual(page.problems, []);
+});
+
+test("a refused candidate says why", async (context) => {
+  const page = await open(context, await serve(context, results()));
+  await settle(page);
+  await check(page, "Refused").click();
+  const { loops } = JSON.parse(await page.evaluate(async () => (await fetch("a/view.json")).text()));
+  for (const loop of loops) {
+    await page.keyboard.press("n");
+    if (!loop.accepted) break;
+  }
+  await shows(page, "aside", /Refused: \S+/);
+  assert.ok(loops.some((loop) => !loop.accepted && loop.reason));
+});
+
+test("false loops stand out, in the map and by name", async (context) => {
+  const wrong = join(work, "wrong");
+  cpSync(results(), wrong, { recursive: true });
+  const rows = readFileSync(join(wrong, "reference.txt"), "utf8").trim().split("\n");  // of the way back: 30 m beside
+  const moved = rows.map((row, i) => row.split(" ").map((value, k) => (k === 7 && i > rows.length / 2 ? Number(value) + 30 : value)).join(" "));
+  writeFileSync(join(wrong, "reference.txt"), moved.join("\n") + "\n");
+  const page = await open(context, await serve(context, wrong));
+  await settle(page);
+  await shows(page, "header", /, [1-9]\d* of them false/);
+  await looksLike(page, "false_loops");
+  await page.keyboard.press("n");
+  await shows(page, "aside", /False loop: its pose is [\d.]+ m and [\d.]+° from the truth/);
   assert.deepEqual(page.problems, []);
 });
 
@@ -130,6 +199,10 @@ test("the drive plays", async (context) => {
   await page.keyboard.press("Escape");
   await page.keyboard.press(".");
   assert.notEqual(parseFloat(await text(page, "#moment")), seconds);
+  await page.getByLabel("Moment of the drive").fill("40");
+  await shows(page, "#moment", /s, scan 40$/);
+  await settle(page);
+  await looksLike(page, "moment");
 });
 
 test("two points are measured", async (context) => {
@@ -169,6 +242,13 @@ test("a map of two sessions has a colour for each, from the map alone", async (c
   await page.locator("select").selectOption("session");
   assert.ok((await settle(page)) > 10_000);
   await shows(page, "aside", /session 0: two\.toml[\s\S]*session 1: two_b\.toml/);
+  await looksLike(page, "sessions");
+  const shared = await open(context, await serve(context, out));
+  await settle(shared);
+  const { loops } = JSON.parse(await shared.evaluate(async () => (await fetch("a/view.json")).text()));
+  const across = loops.findIndex((loop) => loop.accepted && loop.query >= 2 ** 40 && loop.match < 2 ** 40);
+  assert.ok(across >= 0, "the second session was found in the first");
+  assert.ok(loops[across].evidence.free_space_agreement > 0.5);
   assert.deepEqual(page.problems, []);
 });
 
@@ -247,6 +327,8 @@ test("a report is one file that needs no server", async (context) => {
   assert.ok((await settle(page)) > 5_000);
   await page.keyboard.press("n");
   await shows(page, "aside", /Evidence/);
+  await page.locator("figure").nth(1).waitFor();
+  assert.equal(await page.locator("canvas.picture").count(), 4, "both scans and both descriptors");
   assert.deepEqual(page.problems, []);
 });
 
@@ -260,9 +342,17 @@ test("it grows while slam works, then shows the points, and nothing is lost when
   const first = await scans();
   for (const until = Date.now() + 60_000; Date.now() < until && (await scans()) === first;) await page.waitForTimeout(100);
   assert.ok((await scans()) > first);
+  const isFinished = async () => JSON.parse(await (await fetch(`${address}a/view.json`)).text()).has_tiles;
+  let early = 0, hasTiles = false;
+  for (const until = Date.now() + 60_000; Date.now() < until && early === 0 && !hasTiles;) {
+    hasTiles = await isFinished();
+    early = await page.evaluate(() => Number(document.getElementById("stage").dataset.drawn));
+  }
+  assert.ok(early > 0 && !hasTiles, "points of key frames are there before the map is");
   await page.locator(".check", { hasText: "Odometry, before" }).locator("input").click();
+  for (const until = Date.now() + 120_000; Date.now() < until && !(await isFinished());) await page.waitForTimeout(200);
   let drawn = 0;
-  for (const until = Date.now() + 120_000; Date.now() < until && drawn < 10_000;) drawn = await settle(page);
+  for (const until = Date.now() + 60_000; Date.now() < until && drawn < 10_000;) drawn = await settle(page);
   assert.ok(drawn > 10_000, "the page shows the map once it is there");
   await page.close();
   child.kill("SIGINT");

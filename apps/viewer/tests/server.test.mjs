@@ -51,6 +51,14 @@ test("the tiles are what glTF's makers say they must be", async () => {
   }
 });
 
+test("descriptors of detect are made as the run made them", async (context) => {
+  const { drive } = slam("of_slam", { length_m: 60 }), out = join(work, "coarse");
+  revisit("detect", drive, "--out", out, "--descriptor.rings", "12", "--descriptor.sectors", "40");
+  const address = await serve(context, out);
+  const { rings, sectors } = await (await fetch(`${address}a/descriptors/5.json`)).json();
+  assert.deepEqual([rings, sectors], [12, 40]);
+});
+
 test("scans and descriptors come as they were made", async (context) => {
   const address = await serve(context, out);
   const points = new Float32Array(await (await fetch(`${address}a/scans/0.bin`)).arrayBuffer());
