@@ -1,4 +1,5 @@
-# Installs revisit into WORK/prefix, then configures, builds and runs the project in SOURCE against it.
+# Installs revisit into WORK/prefix, then configures, builds and runs the project in SOURCE against it, and builds the
+# package of ROS 1 in NODE, where one is named, as its build farm would: without the repository around it.
 function(run)
   execute_process(COMMAND ${ARGN} RESULT_VARIABLE result)
   if(NOT result EQUAL 0)
@@ -14,3 +15,9 @@ run(${CMAKE_COMMAND} -S ${SOURCE} -B ${WORK}/build_all -G ${GENERATOR} -DCMAKE_P
 run(${CMAKE_COMMAND} --build ${WORK}/build_all)
 run(${WORK}/build_all/consumer_of_all)
 run(${WORK}/prefix/bin/revisit --version)
+if(NODE)
+  file(COPY ${NODE}/ DESTINATION ${WORK}/revisit_ros)
+  run(${CMAKE_COMMAND} -S ${WORK}/revisit_ros -B ${WORK}/build_node -G ${GENERATOR} -DCMAKE_PREFIX_PATH=${WORK}/prefix
+    -DCMAKE_BUILD_TYPE=Release -DPYTHON_EXECUTABLE=/usr/bin/python3)
+  run(${CMAKE_COMMAND} --build ${WORK}/build_node)
+endif()
