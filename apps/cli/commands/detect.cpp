@@ -191,7 +191,7 @@ int detect(const DetectOptions& options) {
   if (database->recording)
     if (const Status status = add_database(detector, *database->recording, run); !status) return fail(status.error());
   if (database->map) run.counts["database_places"] = database->map->places();
-  EvidenceFile evidence(out);
+  EvidenceFile evidence(std::filesystem::path(out) / "evidence.csv");
   const DetectOne detect_one = [&](Scan scan, std::size_t i) -> Result<Detection> {
     if (database->recording) return detector.localise(std::move(scan));
     if (!database->map) return detector.process(std::move(scan), (*recording)->trajectory().at((*recording)->frame(i)));

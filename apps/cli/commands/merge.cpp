@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <set>
 
 #include <revisit/core/stopwatch.hpp>
 #include <revisit/pipeline/merge_maps.hpp>
+#include <revisit/store/map_store.hpp>
 
 #include "common.hpp"
 #include "progress.hpp"
+#include "reports/evidence_file.hpp"
 #include "reports/table.hpp"
 
 namespace revisit::cli {
@@ -21,6 +24,16 @@ struct MergeOptions {
   ParameterFlags parameters;
 };
 
+// What is known of loops within the maps comes along.
+Status add_rows(const std::vector<fs::path>& maps, const MergeReport& report, EvidenceFile& evidence) {
+  std::size_t next = 0;
+  for (const MergeReport::Session& session : report.sessions) {
+    if (session.map != next) continue;  // a further one of the same map
+    if (const Status status = evidence.add_rows_of(MapStore::file_of(maps[next++]), session.id); !status) return status;
+  }
+  return ok();
+}
+
 int merge(const MergeOptions& options) {
   const auto parameters = options.parameters.resolve();
   if (!parameters) return fail(parameters.error(), kUsage);
@@ -28,12 +41,22 @@ int merge(const MergeOptions& options) {
   const std::vector<fs::path> maps(options.maps.begin(), options.maps.end());
   listen_for_interrupt();
   std::unique_ptr<Progress> progress;
-  const auto report = merge_maps(maps, options.out, *parameters, print_log(), [&](std::size_t done, std::size_t of) {
-    if (!progress) progress = std::make_unique<Progress>("merge", "key frames", of);
-    progress->update(done);
-    return !interrupted();
-  });
+  std::optional<EvidenceFile> evidence;  // begun once there is something to merge
+  const auto report = merge_maps(
+      maps, options.out, *parameters, print_log(),
+      [&](std::size_t done, std::size_t of) {
+        if (!progress) progress = std::make_unique<Progress>("merge", "key frames", of);
+        progress->update(done);
+        return !interrupted();
+      },
+      [&](const Detection& detection) {
+        if (!evidence) evidence = EvidenceFile::of_map(options.out, FrameId{-1});
+        return evidence->add(detection);
+      });
   progress.reset();
+  if (const Status status = report && evidence ? add_rows(maps, *report, *evidence) : ok(); !status)
+    return fail(status.error());
+  if (std::error_code ignored; !report && evidence) fs::remove(evidence_of_map(options.out), ignored);
   if (!report) return fail(report.error(), interrupted() ? kInterrupted : kFailed);
 
   Table table = {{"session", "recording", "key frames", "loops to other sessions", "part of the map"}};

@@ -313,12 +313,11 @@ int slam(const SlamOptions& options) {
   if (std::error_code failure; !options.resume && fs::exists(out / "tiles" / "tileset.json", failure))
     fs::remove_all(out / "tiles", failure);  // of another map
   std::vector<EvidenceFile> evidence;
-  evidence.emplace_back(out, slam->last_frame());
-  const fs::path map_file = options.into.empty() ? fs::path() : MapStore::file_of(options.into);
-  if (map_file.filename() == MapStore::kFileName) {
+  evidence.emplace_back(out / "evidence.csv", slam->last_frame());
+  if (!options.into.empty()) {
     const auto last = slam->last_frame();
     const FrameId before{in_map(slam->session(), last.value_or(FrameId{0})).value - (last ? 0 : 1)};
-    evidence.push_back(EvidenceFile::of_map(map_file.parent_path(), before));
+    evidence.push_back(EvidenceFile::of_map(MapStore::file_of(options.into), before));
   }
   const auto viewer = options.is_viewed ? look_at(options.into.empty() ? out : fs::path(options.into))
                                         : Result<std::unique_ptr<ViewServer>>(nullptr);

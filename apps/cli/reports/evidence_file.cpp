@@ -6,6 +6,8 @@
 #include <iomanip>
 #include <system_error>
 
+#include <revisit/store/map_store.hpp>
+
 namespace revisit::cli {
 
 namespace {
@@ -26,8 +28,12 @@ void cut_after(const std::string& file, FrameId last) {
 
 }  // namespace
 
-EvidenceFile::EvidenceFile(const std::filesystem::path& folder, std::optional<FrameId> last)
-    : file_((folder / "evidence.csv").string()) {
+std::filesystem::path evidence_of_map(const std::filesystem::path& map_file) {
+  const bool is_of_results = map_file.filename() == MapStore::kFileName;
+  return map_file.parent_path() / (is_of_results ? "evidence.csv" : map_file.stem().string() + ".evidence.csv");
+}
+
+EvidenceFile::EvidenceFile(const std::filesystem::path& csv, std::optional<FrameId> last) : file_(csv.string()) {
   if (last) cut_after(file_, *last);
   stream_.open(file_, last ? std::ios::app : std::ios::trunc);
   stream_ << std::setprecision(10);
@@ -36,8 +42,8 @@ EvidenceFile::EvidenceFile(const std::filesystem::path& folder, std::optional<Fr
                "distance_m,least_fixed,voxel_m,inliers,log_odds,tx,ty,tz,qx,qy,qz,qw\n";
 }
 
-EvidenceFile EvidenceFile::of_map(const std::filesystem::path& folder, FrameId last) {
-  EvidenceFile file(folder, last);
+EvidenceFile EvidenceFile::of_map(const std::filesystem::path& map_file, FrameId last) {
+  EvidenceFile file(evidence_of_map(map_file), last);
   file.is_of_map_ = true;
   return file;
 }
@@ -57,6 +63,22 @@ Status EvidenceFile::add(const Detection& detection) {
           each.evidence.log_odds, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()})
       stream_ << ',' << value;
     stream_ << '\n';
+  }
+  stream_.flush();
+  return stream_ ? ok() : Status(Error{file_ + ": cannot be written"});
+}
+
+Status EvidenceFile::add_rows_of(const std::filesystem::path& map_file, int first_session) {
+  std::ifstream stream(evidence_of_map(map_file));
+  for (std::string line; std::getline(stream, line) && !stream.eof();) {
+    std::int64_t query = 0, match = 0;
+    const char* const end = line.data() + line.size();
+    const auto first = std::from_chars(line.data(), end, query);
+    if (first.ec != std::errc() || first.ptr == end) continue;
+    const auto second = std::from_chars(first.ptr + 1, end, match);
+    if (second.ec != std::errc()) continue;
+    const std::int64_t later = in_map(first_session, FrameId{0}).value;
+    stream_ << query + later << ',' << match + later << second.ptr << '\n';
   }
   stream_.flush();
   return stream_ ? ok() : Status(Error{file_ + ": cannot be written"});

@@ -11,6 +11,7 @@
 #include <revisit/store/keyframe_bytes.hpp>
 
 #include "common.hpp"
+#include "reports/evidence_file.hpp"
 #include "reports/run_file.hpp"
 #include "view/view_data.hpp"
 
@@ -72,7 +73,7 @@ Result<std::string> ResultsView::json() {
                     .string();
   if (const auto run = read_run(folder_ / "run.json"); run && data->input.empty()) data->input = run->input;
   data->has_tiles = has_tiles();
-  return to_view_json(*data, folder_);
+  return to_view_json(*data, folder_, has_map() ? evidence_of_map(map_file_) : folder_ / "evidence.csv");
 }
 
 // The one that was worked on, where it is still there.

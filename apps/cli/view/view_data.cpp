@@ -144,8 +144,8 @@ Json scans_of(const ViewData& data) {
   return scans;
 }
 
-Json loops_of(const ViewData& data, const Reference& reference, const fs::path& folder, Json& problems) {
-  const auto evidence = read_evidence(folder / "evidence.csv", problems);
+Json loops_of(const ViewData& data, const Reference& reference, const fs::path& evidence_csv, Json& problems) {
+  const auto evidence = read_evidence(evidence_csv, problems);
   std::map<std::pair<FrameId, FrameId>, JudgedLoop> judged;
   for (const JudgedLoop& each : evaluate_loops(data.loops, reference).loops) judged[{each.query, each.match}] = each;
   // The true pose of a query in its match.
@@ -274,7 +274,7 @@ Result<ViewData> read_detect_view(const fs::path& folder) {
   return data;
 }
 
-Result<std::string> to_view_json(const ViewData& data, const fs::path& folder) {
+Result<std::string> to_view_json(const ViewData& data, const fs::path& folder, const fs::path& evidence) {
   const Reference reference = reference_of(data);
   Json problems = Json::array();
   Json view = {{"format", "revisit view"},
@@ -288,7 +288,7 @@ Result<std::string> to_view_json(const ViewData& data, const fs::path& folder) {
                {"revisits", reference.revisits().size()},
                {"has_tiles", data.has_tiles},
                {"scans", scans_of(data)},
-               {"loops", loops_of(data, reference, folder, problems)},
+               {"loops", loops_of(data, reference, evidence, problems)},
                {"answers", answers_of(data, reference)}};
   view["problems"] = std::move(problems);
   if (data.north_deg) view["north_deg"] = rounded(*data.north_deg);

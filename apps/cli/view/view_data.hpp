@@ -38,7 +38,8 @@ struct ViewData {
 /// Of a map (its folder may hold more), or of what `detect` wrote.
 Result<ViewData> read_map_view(const std::filesystem::path& map_file);
 Result<ViewData> read_detect_view(const std::filesystem::path& folder);
-/// view.json (docs/formats.md); `folder` gives evidence.csv and run.json, where they are.
-Result<std::string> to_view_json(const ViewData& data, const std::filesystem::path& folder);
+/// view.json (docs/formats.md); `folder` gives run.json and `evidence` is an evidence.csv, where they are.
+Result<std::string> to_view_json(const ViewData& data, const std::filesystem::path& folder,
+                                 const std::filesystem::path& evidence);
 
 }  // namespace revisit::cli

@@ -249,6 +249,14 @@ test("a map of two sessions has a colour for each, from the map alone", async (c
   const across = loops.findIndex((loop) => loop.accepted && loop.query >= 2 ** 40 && loop.match < 2 ** 40);
   assert.ok(across >= 0, "the second session was found in the first");
   assert.ok(loops[across].evidence.free_space_agreement > 0.5);
+  const { out: other } = slam("two_c", { length_m: 150, day: 3 }), all = join(work, "all.revisit");
+  revisit("merge", out, other, "--out", all);
+  const merged = await open(context, await serve(context, all));
+  const found = JSON.parse(await merged.evaluate(async () => (await fetch("a/view.json")).text())).loops.filter((loop) => loop.accepted);
+  for (const session of [1, 2]) {  // what the first map knew, and what merging found
+    const of = found.filter((loop) => Math.floor(loop.query / 2 ** 40) === session && Math.floor(loop.match / 2 ** 40) !== session);
+    assert.ok(of.length > 0 && of.every((loop) => loop.evidence.free_space_agreement > 0.5), `session ${session}`);
+  }
   assert.deepEqual(page.problems, []);
 });
 

@@ -185,15 +185,25 @@ TEST(MergeMaps, JoinsWhatBelongsTogetherAndNothingElse) {
   (void)drive(folder / "c", back, 61);
   const std::vector<fs::path> maps{folder / "a", folder / "b", folder / "c"};
   std::size_t last_done = 0, all = 0;
-  const auto report = merge_maps(maps, out, {}, {}, [&](std::size_t done, std::size_t of) {
-    EXPECT_EQ(done, last_done + 1);
-    last_done = done;
-    all = of;
-    return true;
-  });
+  std::size_t accepted = 0;
+  const auto report = merge_maps(
+      maps, out, {}, {},
+      [&](std::size_t done, std::size_t of) {
+        EXPECT_EQ(done, last_done + 1);
+        last_done = done;
+        all = of;
+        return true;
+      },
+      [&](const Detection& detection) {
+        if (detection.loop) EXPECT_EQ(session_of(detection.loop->query), 2);
+        accepted += detection.loop ? 1 : 0;
+        return ok();
+      });
+  EXPECT_GE(accepted, 6u);
   ASSERT_TRUE(report) << report.error().message;
   EXPECT_EQ(last_done, all);
   ASSERT_EQ(report->sessions.size(), 3u);
+  EXPECT_EQ(report->sessions[2].map, 2u);
   EXPECT_EQ(report->sessions[0].parts, std::set{0});
   EXPECT_FALSE(report->sessions[1].parts.contains(0));
   EXPECT_EQ(report->sessions[2].parts, std::set{0});

@@ -39,10 +39,11 @@ Result<Source> open_source(const fs::path& path) {
 class Merger {
  public:
   Merger(std::shared_ptr<MapStore> store, const Parameters& parameters, const LogSink& log,
-         std::function<bool()> advance)
+         std::function<bool()> advance, std::function<Status(const Detection&)> take)
       : store_(store),
         parameters_(parameters),
         advance_(std::move(advance)),
+        take_(std::move(take)),
         back_end_(parameters, Odometry::Source::kLidar, std::move(store), log) {}
 
   Status add(const Source& source);
@@ -56,6 +57,8 @@ class Merger {
   std::shared_ptr<MapStore> store_;
   Parameters parameters_;
   std::function<bool()> advance_;
+  std::function<Status(const Detection&)> take_;
+  std::size_t maps_ = 0;  ///< added so far
   SlamBackEnd back_end_;
   MergeReport report_;
   // Of the map at work.
@@ -126,13 +129,16 @@ Status Merger::add(const Source& source) {
     const int id = session.id + first_session_;
     if (id != static_cast<int>(report_.sessions.size()))
       return Error{source.file.string() + ": its sessions are not numbered one after the other"};
-    report_.sessions.push_back({id, session.recording, 0, {}, 0});
+    report_.sessions.push_back({id, maps_, session.recording, 0, {}, 0});
     if (Status begun = back_end_.begin_session({id, session.recording, session.parameters, session.sensor}); !begun)
       return begun;
     for (; keyframe != source.map.keyframes.end() && session_of(keyframe->frame.frame) == session.id; ++keyframe) {
       auto entered = entry(source, *keyframe);
       if (!entered) return entered.error();
-      if (const auto added = back_end_.add_entry(*std::move(entered), places); !added) return added.error();
+      const auto added = back_end_.add_entry(*std::move(entered), places);
+      if (!added) return added.error();
+      if (take_ && added->detection)
+        if (Status taken = take_(*added->detection); !taken) return taken;
       ++report_.sessions.back().keyframes;
       if (const auto& settled = keyframe->settled)
         anchors_[settled->part] = {renumbered(settled->keyframe), settled->T_map_lidar};
@@ -146,6 +152,7 @@ Status Merger::add(const Source& source) {
       if (!advance_()) return Error{"interrupted; nothing was written"};
     }
   }
+  ++maps_;
   return add_scans(source);
 }
 
@@ -194,7 +201,8 @@ Result<MergeReport> Merger::finish() {
 }  // namespace
 
 Result<MergeReport> merge_maps(std::span<const fs::path> maps, const fs::path& out, const Parameters& parameters,
-                               const LogSink& log, const std::function<bool(std::size_t, std::size_t)>& progress) {
+                               const LogSink& log, const std::function<bool(std::size_t, std::size_t)>& progress,
+                               const std::function<Status(const Detection&)>& take) {
   if (const Status status = validate(parameters); !status) return status.error();
   std::error_code failure;
   if (fs::exists(out, failure)) return Error{out.string() + ": exists already; name another file"};
@@ -219,7 +227,8 @@ Result<MergeReport> merge_maps(std::span<const fs::path> maps, const fs::path& o
   Result<MergeReport> report = Error{};
   const auto written = std::make_shared<MapStore>(*std::move(store));
   {
-    Merger merger(written, parameters, log, [&] { return !progress || progress(++done, keyframes); });
+    Merger merger(
+        written, parameters, log, [&] { return !progress || progress(++done, keyframes); }, take);
     Status status = ok();
     for (const Source& source : sources)
       if (status) status = merger.add(source);
