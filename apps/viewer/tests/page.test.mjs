@@ -234,8 +234,8 @@ test("it fits a telephone, and a large screen in the dark", async (context) => {
 });
 
 test("a map of two sessions has a colour for each, from the map alone", async (context) => {
-  const { out } = slam("two", { length_m: 150 });
-  slam("two_b", { length_m: 150, day: 2 }, ["--into", out]);
+  const { out } = slam("two", { length_m: 90 });
+  slam("two_b", { length_m: 90, day: 2 }, ["--into", out]);
   mkdirSync(join(work, "alone"));
   cpSync(join(out, "map.revisit"), join(work, "alone", "home.revisit"));
   const page = await open(context, await serve(context, join(work, "alone", "home.revisit")));
@@ -249,7 +249,7 @@ test("a map of two sessions has a colour for each, from the map alone", async (c
   const across = loops.findIndex((loop) => loop.accepted && loop.query >= 2 ** 40 && loop.match < 2 ** 40);
   assert.ok(across >= 0, "the second session was found in the first");
   assert.ok(loops[across].evidence.free_space_agreement > 0.5);
-  const { out: other } = slam("two_c", { length_m: 150, day: 3 }), all = join(work, "all.revisit");
+  const { out: other } = slam("two_c", { length_m: 90, day: 3 }), all = join(work, "all.revisit");
   revisit("merge", out, other, "--out", all);
   const merged = await open(context, await serve(context, all));
   const found = JSON.parse(await merged.evaluate(async () => (await fetch("a/view.json")).text())).loops.filter((loop) => loop.accepted);
