@@ -21,7 +21,7 @@ std::optional<std::string> read_tile(const fs::path& folder, const std::string& 
   return std::string{std::istreambuf_iterator<char>(stream), {}};
 }
 
-std::string bytes_of(std::span<const Point> points) {
+std::string bytes_of_points(std::span<const Point> points) {
   return {reinterpret_cast<const char*>(points.data()), points.size() * sizeof(Point)};
 }
 

@@ -14,7 +14,7 @@ namespace revisit::cli {
 /// A file of the tileset in `folder`, and no other, wherever links may lead; absent where it is not there.
 std::optional<std::string> read_tile(const std::filesystem::path& folder, const std::string& name);
 /// scans/N.bin (docs/formats.md, "View").
-std::string bytes_of(std::span<const Point> points);
+std::string bytes_of_points(std::span<const Point> points);
 /// descriptors/N.json.
 std::string to_json(const IntensityScanContext& descriptor);
 

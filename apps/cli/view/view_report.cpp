@@ -111,7 +111,7 @@ void add_scans(ResultsView& view, const nlohmann::json& loops, std::size_t most_
       if (!points) continue;
       std::vector<Point> few;
       for (std::size_t i = 0; i < points->size(); i += 1 + points->size() / kPointsAScan) few.push_back((*points)[i]);
-      files[scan] = to_base64(bytes_of(few));
+      files[scan] = to_base64(bytes_of_points(few));
       bytes += few.size() * sizeof(Point);
       const auto descriptor = view.descriptor(FrameId{frame});
       if (!descriptor || !*descriptor) continue;

@@ -123,7 +123,7 @@ class ViewServer::Implementation {
       if (view == nullptr || !frame) return;
       const auto points = view->points(*frame);
       if (!points) return refuse(response, 404, points.error().message);
-      response.set_content(bytes_of(*points), "application/octet-stream");
+      response.set_content(bytes_of_points(*points), "application/octet-stream");
     });
     server_.Get(R"(/([ab])/descriptors/(\d{1,18})\.json)", [this](const Request& request, Response& response) {
       auto* view = view_of(request, response);
