@@ -127,7 +127,8 @@ def compare_power(name, folder, arguments_of, times, chance, library):
         if sys.stderr.isatty():
             print(f"\r{name}: {i + 1} of {times}", end="", file=sys.stderr)
     shutil.rmtree(folder / "whole")
-    print(f"{name}: the power failed {lost} times, before writes of {writes}, the same {sum(not each.endswith("evidence.csv") for each in whole)} files and tables")
+    same = sum(not each.endswith("evidence.csv") for each in whole)
+    print(f"{name}: the power failed {lost} times, before writes of {writes}, the same {same} files and tables")
 
 
 def main():
