@@ -11,7 +11,7 @@ if(NOT CMAKE_BUILD_TYPE)
 endif()
 # The library as the repository around has it; where this folder is a release of its own, as it is installed.
 get_filename_component(here ${CMAKE_CURRENT_LIST_DIR} REALPATH)
-if(EXISTS ${here}/../node)
+if(EXISTS ${here}/../node/node.hpp)
   add_subdirectory(${here}/../.. revisit EXCLUDE_FROM_ALL)
 else()
   find_package(revisit 0.2 REQUIRED COMPONENTS node)
