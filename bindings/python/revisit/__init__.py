@@ -350,11 +350,15 @@ class PlaceIndex:
 
 def open_recording(path, *, topic="", poses="", odometry_topic=""):
     """A Recording of anything that the program reads: KITTI folders, folders of scans, ROS bags (.bag, .mcap, .db3),
-    packet captures. Indexable and iterable. topic: of the scans, where a bag has several. poses: a file of reference
-    poses."""
+    packet captures, the .toml of a simulated drive. Indexable and iterable. topic: of the scans, where a bag has
+    several. poses: a file of reference poses; a simulated drive has its own."""
     path = _os.fspath(path)
     if not _os.path.exists(path):
         raise FileNotFoundError(2, "no such recording", path)
+    if path.endswith(".toml"):
+        if poses:
+            raise ValueError(f"poses is {poses!r}; a simulated recording has its own, exact poses")
+        return _core.simulate(Parameters(file=path)._values)
     return _core.open_recording(path, topic, poses, odometry_topic)
 
 

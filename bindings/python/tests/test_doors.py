@@ -263,6 +263,20 @@ def test_recordings_are_sequences(drive):
         drive[150]
 
 
+def test_a_simulated_drive_is_described_by_a_file(tmp_path):
+    options = {"world": "warehouse", "sensor": "vlp16", "seed": 6, "frames": 4}
+    file = tmp_path / "drive.toml"
+    file.write_text("[simulation]\n" + "".join(f"{key} = {json.dumps(value)}\n" for key, value in options.items()))
+    described, named = revisit.open_recording(file), revisit.simulate(**options)
+    assert len(described) == len(named) == 4
+    np.testing.assert_array_equal(described[3].points, named[3].points)
+    with pytest.raises(ValueError, match="exact poses"):
+        revisit.open_recording(file, poses="poses.txt")
+    file.write_text("[simulation]\nworld = 'moon'\n")
+    with pytest.raises((ValueError, revisit.Error), match="moon"):
+        revisit.open_recording(file)
+
+
 def test_messages_go_to_logging(scans, caplog):
     with caplog.at_level(logging.INFO, logger="revisit"):
         revisit.LoopDetector().process(scans[0])
