@@ -19,9 +19,9 @@ struct TrajectoryPoint {
   /// Segments of one origin have the same coordinates, though tracking failed for a moment in between: good enough to
   /// tell what is far away.
   int origin = 0;
-  double off_m = 0.0;  ///< what the gaps since the origin may be off, all together
+  double gaps_m2 = 0.0;  ///< variance of what the gaps since the origin are off, all together
 
-  void archive(auto& fields) { fields(segment, T_segment_lidar, travelled_m, turned_rad, origin, off_m); }
+  void archive(auto& fields) { fields(segment, T_segment_lidar, travelled_m, turned_rad, origin, gaps_m2); }
 
   /// The next point of the same segment.
   TrajectoryPoint after(const Pose& T_here_next) const {
@@ -30,13 +30,13 @@ struct TrajectoryPoint {
             travelled_m + T_here_next.translation().norm(),
             turned_rad + rotation_angle(T_here_next),
             origin,
-            off_m};
+            gaps_m2};
   }
-  /// The first point of the next segment, where tracking failed in between: off by so many metres at most.
+  /// The first point of the next segment, where tracking failed in between: off by a deviation of so many metres.
   TrajectoryPoint after_gap(const Pose& T_here_next, double gap_m) const {
     TrajectoryPoint next = after(T_here_next);
     ++next.segment;
-    next.off_m += gap_m;
+    next.gaps_m2 += gap_m * gap_m;
     return next;
   }
   /// The same as after(), where the pose of the next one is known.

@@ -96,7 +96,7 @@ OdometryStep Odometry::match(const Scan& scan, double stamp_s, const std::option
   ScanMatch match = matcher_.match(stamp_s, thinned, T_previous_lidar ? T_previous_lidar : motion_by_imu(stamp_s),
                                    !T_previous_lidar || is_guess);
   if (is_swept && match.prediction_error_m > Following::kWrong_m) {
-    const Twist found = with_imu(twist_of(match.T_previous_found, stamp_s - last_stamp_s_));
+    const Twist found = with_imu(matcher_.motion_found(match.T_previous_found, stamp_s));
     std::vector<Point> again = compensated(scan, found);
     if (first_scan_) begin_map_again(found);
     MatcherScan thinned_again = matcher_.thinned(again);

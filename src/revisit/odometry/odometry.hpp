@@ -43,8 +43,7 @@ class Odometry {
     kLidar,    ///< scans are matched; a pose that comes with them is a first guess (wheels)
     kExternal  ///< the poses that come with the scans are taken as they are
   };
-  explicit Odometry(Source source = Source::kLidar, const ScanMatcher::Resolution& resolution = ScanMatcher::kFine)
-      : source_(source), matcher_(resolution) {}
+  explicit Odometry(Source source = Source::kLidar) : source_(source) {}
 
   /// `T_external_lidar`: the pose from wheels or another odometry, in any frame of its own; it may slip and drift.
   OdometryStep follow(const Scan& scan, const std::optional<Pose>& T_external_lidar = std::nullopt);

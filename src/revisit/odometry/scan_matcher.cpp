@@ -17,6 +17,8 @@ namespace {
 
 // Chosen on simulated drives and KITTI raw 0005 (docs/slam.md, docs/history.md).
 struct Matching {
+  // Edge of the map's voxels: voxels to the median range, and its bounds.
+  static constexpr double kVoxelsToTheMedian = 12.0, kSmallestVoxel_m = 0.25, kLargestVoxel_m = 1.0;
   static constexpr double kPointsAlongAVoxel = 2.0;  ///< that the map is given
   static constexpr double kMapReach_m = 100.0;
   static constexpr float kForgetEvery_m = 5.f;  ///< what lies beyond the reach
@@ -31,6 +33,7 @@ struct Matching {
   static constexpr double kNoise_m = 0.03;    ///< of points, where patches count by their variance
   static constexpr double kFineVoxels = 0.3, kFine_m = 0.1;  ///< narrowest kernel: so many voxels and so much more
   static constexpr double kTurnsTried_deg[] = {0.0, 5.0, -5.0, 10.0, -10.0};  ///< where the prediction failed
+  static constexpr double kFastestTurn_degps = 300.0, kTurnStep_deg = 15.0;   ///< since the last scan that was tracked
   static constexpr std::size_t kFew = 1000;  ///< points of a scan, about, with which these are tried
 
   static constexpr double kFewestMatched = 0.3;     ///< share of the points of a scan that is tracked
@@ -45,6 +48,7 @@ struct Matching {
   static constexpr double kNarrowSearch_m = 0.3;  ///< where a wide search found what cannot be
   // The first scans of a sparse sensor meet few surfaces; those that they meet must fit.
   static constexpr int kFirstScans = 5;
+  static constexpr double kStart_m = 1.0;  ///< tried on every side
   static constexpr double kFewestMatchedAtFirst = 0.1, kFittingAtFirst = 0.6;
 
   static constexpr double kLongestGap_s = 1.0;  ///< beyond, the motion before says nothing about the motion now
@@ -101,8 +105,7 @@ class ScanMatcher::Insertion {
   tbb::task_group tasks_;
 };
 
-ScanMatcher::ScanMatcher(const Resolution& resolution)
-    : resolution_(resolution), insertion_(std::make_unique<Insertion>()) {}
+ScanMatcher::ScanMatcher() : insertion_(std::make_unique<Insertion>()) {}
 ScanMatcher::~ScanMatcher() = default;
 ScanMatcher::ScanMatcher(ScanMatcher&&) noexcept = default;
 ScanMatcher& ScanMatcher::operator=(ScanMatcher&&) noexcept = default;
@@ -118,8 +121,8 @@ MatcherScan ScanMatcher::thinned(std::span<const Point> points) const {
   MatcherScan scan;
   scan.range_m = map_ ? range_m_ : median_range_m(points);
   scan.voxel_m = map_ ? map_->voxel_m()
-                      : std::clamp(scan.range_m / resolution_.voxels_to_the_median, resolution_.smallest_voxel_m,
-                                   resolution_.largest_voxel_m);
+                      : std::clamp(scan.range_m / Matching::kVoxelsToTheMedian, Matching::kSmallestVoxel_m,
+                                   Matching::kLargestVoxel_m);
   scan.map_points = thin_surfaces(points, {}, scan.voxel_m / Matching::kPointsAlongAVoxel).points;
   std::vector<Point> thinned_once;
   thinned_once.reserve(scan.map_points.size());
@@ -202,24 +205,43 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
   };
   IcpResult icp = align(radius_m, T_predicted);
   if (!is_possible(icp)) icp = align(std::min(radius_m, Matching::kNarrowSearch_m), T_predicted);
+  // The second scan of a drive that began in motion: what was seen once fits, to some degree, where the sensor stands.
+  if (scans_ == 1 && !measured_m)
+    for (const double angle_deg : {0.0, 90.0, 180.0, 270.0}) {
+      const double angle_rad = to_radians(angle_deg);
+      const IcpResult other = align(radius_m, T_predicted * planar_pose(Matching::kStart_m * std::cos(angle_rad),
+                                                                        Matching::kStart_m * std::sin(angle_rad), 0.0));
+      if (other.matched > icp.matched && is_possible(other)) icp = other;
+    }
   // A turn or a jolt that was not predicted, or the end of one. After a gap anything may fit somehow: nothing is tried.
   // With a few of the points; where these fit better, all are aligned.
   const bool follows = gap_s > 0.0 && gap_s <= Matching::kLongestGap_s;
   std::vector<Eigen::Vector3f> few;
   double best_of_few = 0.0;
-  for (const double turn_deg : Matching::kTurnsTried_deg)
-    for (const Pose& T_guess : {T_predicted, Pose(Pose::Identity())}) {
-      if (fits(icp) || (turn_deg != 0.0 && !follows)) break;
-      if (few.empty())
-        for (std::size_t i = 0; i < scan.points.size(); i += 1 + scan.points.size() / (2 * Matching::kFew))
-          few.push_back(scan.points[i]);
-      const IcpResult tried =
-          align_points(few, Matching::kFarSearch_m, T_guess * planar_pose(0.0, 0.0, to_radians(turn_deg)));
-      if (tried.matched <= best_of_few) continue;
-      best_of_few = tried.matched;
-      const IcpResult other = align(fine_m(), T_odom_lidar_.inverse() * tried.T_target_source);
-      if (fits(other) || other.matched > icp.matched) icp = other;
-    }
+  const auto try_from = [&](const Pose& T_guess, double turn_deg) {
+    if (fits(icp)) return;
+    if (few.empty())
+      for (std::size_t i = 0; i < scan.points.size(); i += 1 + scan.points.size() / (2 * Matching::kFew))
+        few.push_back(scan.points[i]);
+    const IcpResult tried =
+        align_points(few, Matching::kFarSearch_m, T_guess * planar_pose(0.0, 0.0, to_radians(turn_deg)));
+    if (tried.matched <= best_of_few) return;
+    best_of_few = tried.matched;
+    const IcpResult other = align(fine_m(), T_odom_lidar_.inverse() * tried.T_target_source);
+    if (fits(other) || other.matched > icp.matched) icp = other;
+  };
+  const Pose T_tracked = T_odom_lidar_.inverse() * T_odom_tracked_;
+  for (const double turn_deg : Matching::kTurnsTried_deg) {
+    if (turn_deg != 0.0 && !follows) break;
+    try_from(T_predicted, turn_deg);
+    try_from(Pose::Identity(), turn_deg);
+  }
+  // The longer ago it was tracked, the farther may it have turned; the nearest heading that fits is the answer.
+  const double most_deg = std::min(180.0, Matching::kFastestTurn_degps * untracked_s);
+  for (double turn_deg = 0.0; follows && turn_deg <= most_deg; turn_deg += Matching::kTurnStep_deg) {
+    try_from(T_tracked, turn_deg);
+    if (turn_deg > 0.0) try_from(T_tracked, -turn_deg);
+  }
   match.matched = icp.matched;
   match.met = icp.met;
   match.is_tracked = fits(icp);
@@ -247,7 +269,9 @@ void ScanMatcher::accept(double stamp_s, const MatcherScan& scan, const ScanMatc
       typical_match_ += share * (match.matched - typical_match_);
     }
     motion_.reset();
-    if (gap_s > 0.0 && gap_s <= Matching::kLongestGap_s) motion_ = twist_of(match.T_previous_lidar, gap_s);
+    if (gap_s > 0.0 && gap_s <= Matching::kLongestGap_s)
+      motion_ =
+          match.is_tracked ? motion_found(match.T_previous_lidar, stamp_s) : twist_of(match.T_previous_lidar, gap_s);
   }
   T_odom_lidar_ = match.T_odom_lidar;
   const Eigen::Vector3f here = T_odom_lidar_.translation().cast<float>();
@@ -267,6 +291,13 @@ void ScanMatcher::accept(double stamp_s, const MatcherScan& scan, const ScanMatc
     T_odom_tracked_ = match.T_odom_lidar;
   }
   ++scans_;
+}
+
+// Where track is found again, the poses in between were predicted, and the step from the last one makes up for them.
+Twist ScanMatcher::motion_found(const Pose& T_previous_lidar, double stamp_s) const {
+  const double since_tracked_s = stamp_s - tracked_stamp_s_;
+  if (since_tracked_s > Matching::kLongestGap_s) return twist_of(T_previous_lidar, stamp_s - last_stamp_s_);
+  return twist_of(normalised(T_odom_tracked_.inverse() * T_odom_lidar_ * T_previous_lidar), since_tracked_s);
 }
 
 void ScanMatcher::restart() {

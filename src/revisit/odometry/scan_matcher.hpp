@@ -38,13 +38,7 @@ struct ScanMatch {
 /// in the order of their stamps. Belongs to one thread at a time; deterministic, whatever the number of threads.
 class ScanMatcher {
  public:
-  /// How fine the map is: voxels to the median range, and the bounds of their edge.
-  struct Resolution {
-    double voxels_to_the_median, smallest_voxel_m, largest_voxel_m;
-  };
-  static constexpr Resolution kFine{12.0, 0.25, 1.0};   ///< for a trajectory: drift counts over kilometres
-  static constexpr Resolution kCoarse{4.0, 0.75, 1.5};  ///< for detection: sweeps, and motions over some 30 m
-  explicit ScanMatcher(const Resolution& resolution = kFine);
+  ScanMatcher();
   ~ScanMatcher();
   ScanMatcher(ScanMatcher&&) noexcept;
   ScanMatcher& operator=(ScanMatcher&&) noexcept;
@@ -56,6 +50,9 @@ class ScanMatcher {
 
   /// The predicted motion during the coming scan, where it follows closely on the last.
   std::optional<Twist> predicted_motion(double stamp_s) const;
+
+  /// The motion to a scan that was found so far from the one before.
+  Twist motion_found(const Pose& T_previous_lidar, double stamp_s) const;
 
   /// Thins a scan (filtered by range, its sweep compensated).
   MatcherScan thinned(std::span<const Point> points) const;
@@ -93,7 +90,6 @@ class ScanMatcher {
   double search_radius_m() const;
   bool is_credible(double matched, double met, bool is_predicted) const;
 
-  Resolution resolution_;
   std::unique_ptr<LocalMap> map_;
   std::unique_ptr<Insertion> insertion_;  ///< of the last scan into the map; waited for before the map is read
   Pose T_odom_lidar_ = Pose::Identity();

@@ -83,6 +83,23 @@ TEST(ScanMatcher, SaysWhenItDoesNotMatchAndKeepsTheMotionOfTheWheels) {
   }
 }
 
+// Something before the sensor, and it turns meanwhile: the heading is found again, and what came after is predicted by
+// the motion, not by the step that made up for the predictions.
+TEST(ScanMatcher, AfterAWideTurnUnseenItIsFoundAgain) {
+  ScanMatcher matcher;
+  const auto turned = [](int i, double deg) { return pose_of(i) * planar_pose(0.0, 0.0, to_radians(deg)); };
+  for (int i = 0; i < 12; ++i) track(matcher, 0.1 * i, seen_from(31, pose_of(i), static_cast<unsigned>(i)));
+  for (int i = 12; i < 15; ++i) track(matcher, 0.1 * i, {});
+  const ScanMatch found = track(matcher, 1.5, seen_from(31, turned(15, 75.0), 15));
+  ASSERT_TRUE(found.is_tracked) << found.matched;
+  const Pose error = (pose_of(0).inverse() * turned(15, 75.0)).inverse() * found.T_odom_lidar;
+  EXPECT_LT(error.translation().norm(), 0.2);
+  EXPECT_LT(to_degrees(rotation_angle(error)), 1.0);
+  const auto motion = matcher.predicted_motion(1.6);
+  ASSERT_TRUE(motion);
+  EXPECT_NEAR(to_degrees(motion->angular_radps.z()), 75.0 / 0.4, 30.0) << "a second: since the last scan that was seen";
+}
+
 // A bare corridor without an end: every scan looks like the one before, wherever the robot is.
 std::vector<Point> corridor(unsigned noise) {
   std::mt19937 random(noise);

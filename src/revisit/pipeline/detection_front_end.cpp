@@ -9,15 +9,15 @@
 namespace revisit {
 namespace {
 
-constexpr double kGap_m = 0.5;  // what odometry may be off once it is back on its map
+constexpr double kLongestUnconfirmed_s = 1.0;  // that odometry is believed
+constexpr double kLongestGap_s = 5.0;          // after which it may find its map again
+constexpr double kGap_m = 0.5;         // what odometry may be off once it is back on its map
 
 }  // namespace
 
 DetectionFrontEnd::DetectionFrontEnd(const Parameters& parameters, const std::optional<IntensityScale>& scale,
                                      IntensityCalibration calibration, LogSink log)
-    : parameters_(require_valid(parameters)),
-      odometry_(Odometry::Source::kLidar, ScanMatcher::kCoarse),
-      preparation_(parameters, scale, std::move(calibration), std::move(log)) {}
+    : parameters_(require_valid(parameters)), preparation_(parameters, scale, std::move(calibration), std::move(log)) {}
 
 Result<DetectionFrontEnd::Step> DetectionFrontEnd::step(Scan scan) {
   Stopwatch watch;
@@ -31,7 +31,7 @@ Result<DetectionFrontEnd::Step> DetectionFrontEnd::step(Scan scan) {
   if (!prepared) {
     previous_.reset();
     awaits_motion_.reset();
-    point_ = {.segment = point_.segment + 1, .origin = ++origins_};
+    pass(step);
     return prepared.error();
   }
   prepared->geometry = std::make_shared<ScanGeometry>(prepared->cloud);
@@ -54,21 +54,44 @@ std::optional<PreparedScan> DetectionFrontEnd::compensated_previous(const Odomet
 
 // On the segment of the scan before, where odometry is sure of the motion and the scans themselves confirm it.
 TrajectoryPoint DetectionFrontEnd::next_point(const OdometryStep& step, PreparedScan& prepared) {
-  const bool is_connected =
-      step.is_connected && previous_ && typical_.add(*previous_, *prepared.geometry, step.T_previous_lidar);
+  const bool has_both = step.is_connected && previous_;
   TrajectoryPoint point;
-  if (is_connected) {
+  if (has_both && typical_.add(*previous_, *prepared.geometry, step.T_previous_lidar)) {
     point = point_.after(step.T_previous_lidar);
+    confirmed_s_ = step.stamp_s;
   } else {
     typical_.interrupt();
-    // Back on the map that it was lost on for a moment; else, nothing is known any more.
-    const bool is_back = step.is_tracked && !step.is_connected && tracked_ && tracked_->segment == step.segment;
-    point = is_back ? tracked_->point.after_gap(tracked_->T_odom_lidar.inverse() * step.T_odom_lidar, kGap_m)
-                    : TrajectoryPoint{.origin = ++origins_};
+    if (goes_on(step, has_both)) {
+      point = point_after_gap(step, kGap_m);
+    } else {
+      point.origin = ++origins_;
+      confirmed_s_.reset();
+    }
     point.segment = point_.segment + 1;
   }
-  if (step.is_tracked) tracked_ = {point, step.segment, step.T_odom_lidar};
+  if (step.is_tracked) tracked_ = {point, step.segment, step.T_odom_lidar, step.stamp_s};
   return point;
+}
+
+// Whether odometry is back on the map that it had. What nothing confirms, where it predicts the scan to be or where
+// scans contradict it, counts only after scans confirmed it: those that lie far apart never do.
+bool DetectionFrontEnd::goes_on(const OdometryStep& step, bool is_contradicted) const {
+  if (!tracked_ || tracked_->segment != step.segment) return false;
+  if (step.is_tracked && !is_contradicted) return step.stamp_s - tracked_->stamp_s <= kLongestGap_s;
+  return confirmed_s_ && step.stamp_s - *confirmed_s_ <= kLongestUnconfirmed_s;
+}
+
+// What is predicted may be off by all that it says to have moved.
+TrajectoryPoint DetectionFrontEnd::point_after_gap(const OdometryStep& step, double gap_m) const {
+  const Pose T_tracked_lidar = tracked_->T_odom_lidar.inverse() * step.T_odom_lidar;
+  const double predicted_m = step.is_tracked ? 0.0 : T_tracked_lidar.translation().norm();
+  return tracked_->point.after_gap(T_tracked_lidar, gap_m + predicted_m);
+}
+
+// A scan that describes no place: odometry went on.
+void DetectionFrontEnd::pass(const OdometryStep& step) {
+  if (step.is_tracked && goes_on(step, false))
+    tracked_ = {point_after_gap(step, 0.0), step.segment, step.T_odom_lidar, step.stamp_s};
 }
 
 }  // namespace revisit

@@ -33,6 +33,9 @@ class DetectionFrontEnd {
 
  private:
   TrajectoryPoint next_point(const OdometryStep& step, PreparedScan& prepared);
+  bool goes_on(const OdometryStep& step, bool is_contradicted) const;
+  TrajectoryPoint point_after_gap(const OdometryStep& step, double gap_m) const;
+  void pass(const OdometryStep& step);
   std::optional<PreparedScan> compensated_previous(const OdometryStep& step);
 
   Parameters parameters_;
@@ -44,8 +47,10 @@ class DetectionFrontEnd {
     TrajectoryPoint point;
     int segment = 0;  ///< of odometry
     Pose T_odom_lidar = Pose::Identity();
+    double stamp_s = 0.0;
   };
   std::optional<Tracked> tracked_;                ///< the last scan that odometry tracked
+  std::optional<double> confirmed_s_;             ///< when scans last confirmed its motion, since the origin
   std::optional<Scan> awaits_motion_;             ///< the last scan, where its sweep could not be compensated
   int origins_ = 0;                               ///< of trajectory points, so far
   std::shared_ptr<const ScanGeometry> previous_;  ///< likewise; null where it described no place

@@ -96,7 +96,6 @@ Localiser::Localiser(SavedPlaces map, const Parameters& parameters, LogSink log,
                      const std::optional<IntensityScale>& scale)
     : parameters_(parameters),
       map_(std::move(map)),
-      odometry_(Odometry::Source::kLidar, ScanMatcher::kCoarse),
       preparation_(parameters, scale, {}, std::move(log)),
       recognition_(parameters, clouds_in_store(map_.store()), map_.take_index()) {
   for (const StoredMapPose& each : map_.poses())

@@ -13,9 +13,6 @@ namespace revisit {
 namespace {
 
 constexpr std::size_t kLearnsEvery = 4;  // queries: how much alike places are changes slowly
-// Of places that odometry knows nothing of (expect_one_drive()). In streets that are the same tree for tree, wrong ones
-// reach 3.2 by themselves (OS0-128 and rosette along 08, seed 304).
-constexpr double kUnknownInTheOpen_log_odds = -3.0;
 
 }  // namespace
 
@@ -73,7 +70,7 @@ VerificationContext PlaceRecognition::context(const TypicalAgreement& typical, c
           .typical = typical,
           .look_alikes_log_odds = look_alikes_log_odds(),
           .newest = newest,
-          .unknown_in_the_open_log_odds = is_one_drive_ ? kUnknownInTheOpen_log_odds : 0.0};
+          .is_one_drive = is_one_drive_};
 }
 
 Result<Hypothesis> PlaceRecognition::test(const PreparedScan& query, const PosePrediction& prediction,

@@ -140,6 +140,23 @@ class BuildingBuilder {
   World& world_;
 };
 
+// Where the way breaks off to another side, the body follows: nobody turns faster, or all at once.
+void turn_as_people_do(std::vector<Knot>& knots) {
+  constexpr double kFastest_radps = 2.0, kEased_s = 0.4;
+  constexpr double kMost_rad = kFastest_radps * Path::kStep_s;
+  std::vector<double> headings_rad;  // without jumps
+  for (const Knot& knot : knots) {
+    const double before = headings_rad.empty() ? knot.yaw_rad : headings_rad.back();
+    headings_rad.push_back(before + std::clamp(wrap_angle(knot.yaw_rad - before), -kMost_rad, kMost_rad));
+  }
+  constexpr auto kEased = static_cast<std::size_t>(kEased_s / Path::kStep_s);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < knots.size(); ++i) {
+    sum += headings_rad[i] - (i >= kEased ? headings_rad[i - kEased] : 0.0);
+    knots[i].yaw_rad = wrap_angle(sum / static_cast<double>(std::min(i + 1, kEased)));
+  }
+}
+
 // Around the core of each storey, some rounds one way, some the other; rooms are looked into from the corridor.
 std::vector<Knot> walk(double length_m, Random& random) {
   const double out = 0.5 * kCorridor_m;
@@ -170,7 +187,9 @@ std::vector<Knot> walk(double length_m, Random& random) {
     if (step < 0) corners.push_back(corner(storey, 3));
     corners.push_back(corner(storey, 0));
   }
-  return drive(corners, {1.3, 0.6, 0.8, 0.7});
+  std::vector<Knot> knots = drive(corners, {1.3, 0.6, 0.8, 0.7});
+  turn_as_people_do(knots);
+  return knots;
 }
 
 }  // namespace

@@ -84,6 +84,19 @@ TEST(Simulation, ABuildingIsWalkedThrough) {
   EXPECT_NE(refusal(options).find("a building has its own walk"), std::string::npos);
 }
 
+TEST(Simulation, WhoWalksTurnsAsPeopleDo) {
+  const auto walk = make(small("building", "os0-128"));
+  ASSERT_GT(walk->size(), 300u);
+  double most_radps = 0.0;
+  for (std::size_t i = 1; i < walk->size(); ++i) {
+    const Pose T_before = *walk->trajectory().at(walk->frame(i - 1)), T_here = *walk->trajectory().at(walk->frame(i));
+    const double turned_rad = rotation_angle(T_before.inverse() * T_here);
+    most_radps = std::max(most_radps, turned_rad / (walk->stamp_s(i) - walk->stamp_s(i - 1)));
+  }
+  EXPECT_GT(most_radps, 0.5) << "there are corners";
+  EXPECT_LT(most_radps, 2.5);
+}
+
 TEST(Simulation, EverySensorKeepsToItsTable) {
   for (const SensorModel& sensor : sensor_models()) {
     SCOPED_TRACE(sensor.name);

@@ -42,9 +42,7 @@ struct VerificationContext {
   TypicalAgreement typical;
   double look_alikes_log_odds = 0.0;  ///< LookAlikes
   FrameId newest;                     ///< place that may answer
-  /// Of a pose in the open, at a place of the same session of which odometry does not know how it lies to the query,
-  /// since it lost track in between.
-  double unknown_in_the_open_log_odds = 0.0;
+  bool is_one_drive = false;          ///< odometry lost track in between where it does not know how places lie
 };
 
 /// How one hypothesis about a query is tested: seen from overhead, then temporal consistency, then registration

@@ -8,12 +8,13 @@ namespace revisit {
 namespace {
 
 struct Drift {
-  static constexpr double kAlways_m = 15.0;                        ///< loops reach so far
-  static constexpr double kShare = 0.06;                           ///< of the motion in between
-  static constexpr double kMetresARadian = 2.0;                    ///< a turn brings as much drift as so many metres
-  static constexpr double kPose_m = 1.0;                           ///< of registered poses
-  static constexpr double kDeviation_m = 5.0, kUsualShare = 0.01;  ///< what is usual
-  static constexpr double kMost_log_odds = 8.0;
+  static constexpr double kAlways_m = 15.0;                         ///< loops reach so far
+  static constexpr double kShare = 0.06;                            ///< of the motion in between
+  static constexpr double kMetresARadian = 2.0;                     ///< a turn brings as much drift as so many metres
+  static constexpr double kPose_m = 1.0;                            ///< of registered poses
+  static constexpr double kDeviation_m = 2.0, kUsualShare = 0.005;  ///< what is usual
+  static constexpr double kMostDeviations = 3.0;                    ///< more is never off
+  static constexpr double kNever_log_odds = 20.0;
   static constexpr double kShareToLearn = 0.03;
   // Of the heading.
   static constexpr double kAlways_deg = 40.0, kDegreesAMetre = 0.02;
@@ -25,10 +26,10 @@ struct Apart {
       : m(T_between(a, b).translation().norm()),
         motion_m(std::abs(b.travelled_m - a.travelled_m) +
                  Drift::kMetresARadian * std::abs(b.turned_rad - a.turned_rad)),
-        off_m(std::abs(b.off_m - a.off_m)) {}
-  double drift_m(double share) const { return off_m + share * motion_m; }
+        gaps_m(std::sqrt(std::abs(b.gaps_m2 - a.gaps_m2))) {}
+  double drift_m(double share) const { return gaps_m + share * motion_m; }
   double most_m(double share) const { return Drift::kAlways_m + drift_m(share); }
-  double m, motion_m, off_m;
+  double m, motion_m, gaps_m;
 };
 
 }  // namespace
@@ -55,8 +56,10 @@ double odometry_log_odds(const std::optional<TrajectoryPoint>& place, const std:
   if (!place || !query) return 0.0;
   if (place->origin != query->origin) return unknown_log_odds;
   const double off_m = (T_between(*place, *query).inverse() * T_place_query).translation().norm();
-  const double deviation_m = Drift::kDeviation_m + Apart(*place, *query).drift_m(Drift::kUsualShare);
-  return -std::min(0.5 * std::pow(off_m / deviation_m, 2), Drift::kMost_log_odds);
+  const Apart apart(*place, *query);
+  const double deviation_m = std::hypot(Drift::kDeviation_m + Drift::kUsualShare * apart.motion_m, apart.gaps_m);
+  const double deviations = off_m / deviation_m;
+  return deviations > Drift::kMostDeviations ? -Drift::kNever_log_odds : -0.5 * deviations * deviations;
 }
 
 bool are_other_poses(const TrajectoryPoint& a, const Pose& T_a_query, const TrajectoryPoint& b, const Pose& T_b_query) {
