@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kLongestUnconfirmed_s = 1.0;  // that odometry is believed
 constexpr double kLongestGap_s = 5.0;          // after which it may find its map again
-constexpr double kGap_m = 0.5;         // what odometry may be off once it is back on its map
+constexpr double kGap_m = 0.5;                 // what odometry may be off once it is back on its map
 
 }  // namespace
 
