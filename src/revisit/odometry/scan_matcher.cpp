@@ -7,8 +7,8 @@
 
 #include <oneapi/tbb/task_arena.h>
 #include <oneapi/tbb/task_group.h>
-#include <Eigen/Eigenvalues>
 
+#include <revisit/odometry/motion_limits.hpp>
 #include <revisit/registration/icp.hpp>
 #include <revisit/registration/surface_cloud.hpp>
 
@@ -34,22 +34,21 @@ struct Matching {
   static constexpr double kFineVoxels = 0.3, kFine_m = 0.1;  ///< narrowest kernel: so many voxels and so much more
   static constexpr double kTurnsTried_deg[] = {0.0, 5.0, -5.0, 10.0, -10.0};  ///< where the prediction failed
   static constexpr double kFastestTurn_degps = 300.0, kTurnStep_deg = 15.0;   ///< since the last scan that was tracked
+  static constexpr std::size_t kFewestToTurn = 300;                           ///< points: fewer fit at many headings
   static constexpr std::size_t kFew = 1000;  ///< points of a scan, about, with which these are tried
 
   static constexpr double kFewestMatched = 0.3;     ///< share of the points of a scan that is tracked
   static constexpr double kBelowTypical = 0.2;      ///< what it may fall below the running mean
   static constexpr double kBelowUnpredicted = 0.1;  ///< the same, where nothing says what was driven since
   static constexpr double kOfTypical = 0.7;         ///< share of a running mean that is low itself, of a sparse sensor
-  // Scans slide along what hardly fixes them, a wall or a corridor. There, what carries a sensor brakes and jolts no
-  // harder than this.
-  static constexpr double kHardlyFixed = 0.1;  ///< share of all that fixes the position
-  static constexpr double kMostAcceleration_mps2 = 6.0, kJolt_m = 0.1;
-  static constexpr double kMostSlip = 0.6;        ///< of what wheels measure
-  static constexpr double kNarrowSearch_m = 0.3;  ///< where a wide search found what cannot be
+  static constexpr double kMostSlip = 0.6, kSlip_m = 0.1;  ///< of what wheels measure, and so much more
+  static constexpr double kNarrowSearch_m = 0.3;           ///< where a wide search found what cannot be
   // The first scans of a sparse sensor meet few surfaces; those that they meet must fit.
   static constexpr int kFirstScans = 5;
   static constexpr double kStart_m = 1.0;  ///< tried on every side
   static constexpr double kFewestMatchedAtFirst = 0.1, kFittingAtFirst = 0.6;
+  // Beside what is new: share of all points, of those that meet something, and of those that lie where was looked.
+  static constexpr double kFewestBesideNew = 0.15, kFittingOfMet = 0.7, kFittingOfSeen = 0.6;
 
   static constexpr double kLongestGap_s = 1.0;  ///< beyond, the motion before says nothing about the motion now
   static constexpr double kLongestExtrapolation_s = 5.0;  ///< and is still a better guess than none
@@ -70,15 +69,6 @@ std::vector<Eigen::Vector3f> in_map(const std::vector<Eigen::Vector3f>& points, 
   const Eigen::Isometry3f T = T_odom_lidar.cast<float>();
   std::transform(points.begin(), points.end(), moved.begin(), [&](const Eigen::Vector3f& p) { return T * p; });
   return moved;
-}
-
-// How far a step goes along the directions that the scan hardly fixes.
-double slid_m(const Matrix6& information, const Eigen::Vector3d& step) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(information.topLeftCorner<3, 3>());
-  const Eigen::Vector3d along = axes.eigenvectors().transpose() * step;
-  const Eigen::Array3d is_free =
-      (axes.eigenvalues().array() < Matching::kHardlyFixed * axes.eigenvalues().sum()).cast<double>();
-  return (is_free * along.array()).matrix().norm();
 }
 
 }  // namespace
@@ -173,8 +163,8 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
     return match;
   }
   wait();
-  const auto align_points = [&](std::span<const Eigen::Vector3f> points, double width_m, const Pose& T_guess) {
-    IcpResult icp = align_icp(*map_, points, T_odom_lidar_ * T_guess,
+  const auto align_points = [&](std::span<const Eigen::Vector3f> points, double width_m, const Pose& T_from) {
+    IcpResult icp = align_icp(*map_, points, T_odom_lidar_ * T_from,
                               {.coarse_m = width_m,
                                .fine_m = std::min(width_m, fine_m()),
                                .least_reach_m = map_->voxel_m(),
@@ -184,24 +174,31 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
     icp.converged = icp.converged || (icp.information(0, 0) > 0.0 && icp.last_step_m < Matching::kSteady_m);
     return icp;
   };
-  const auto align = [&](double width_m, const Pose& T_guess) { return align_points(scan.points, width_m, T_guess); };
+  const auto align = [&](double width_m, const Pose& T_from) { return align_points(scan.points, width_m, T_from); };
   const double gap_s = stamp_s - last_stamp_s_;
+  const bool follows = gap_s > 0.0 && gap_s <= Matching::kLongestGap_s;
   // Since the last scan that was tracked: the longer ago, the farther may the sensor be from where it was predicted.
   const double untracked_s = stamp_s - tracked_stamp_s_;
+  const MotionLimits limits(T_odom_lidar_ * T_predicted, untracked_s);
   const auto is_possible = [&](const IcpResult& icp) {
     // Wheels slip, but not like this: it is the surroundings that move along with the sensor.
     const double found_m = (T_odom_tracked_.inverse() * icp.T_target_source).translation().norm();
-    if (measured_m &&
-        untracked_m_ + *measured_m - found_m > Matching::kJolt_m + Matching::kMostSlip * (untracked_m_ + *measured_m))
-      return false;
-    if (!motion_ || gap_s <= 0.0) return true;
-    const Pose surprise = (T_odom_lidar_ * T_predicted).inverse() * icp.T_target_source;
-    return slid_m(icp.information, surprise.translation()) <=
-           Matching::kJolt_m + 0.5 * Matching::kMostAcceleration_mps2 * untracked_s * untracked_s;
+    const double wheels_m = untracked_m_ + measured_m.value_or(0.0);
+    if (measured_m && wheels_m - found_m > Matching::kSlip_m + Matching::kMostSlip * wheels_m) return false;
+    return !motion_ || gap_s <= 0.0 || !limits.slides(icp);
   };
   const bool is_predicted = measured_m || untracked_s <= Matching::kLongestExtrapolation_s;
+  // A narrow sensor that turns, or one that comes round a corner, sees mostly what is new: of the rest, most must fit.
+  const auto fits_beside_new = [&](const IcpResult& icp) {
+    if (scans_ < Matching::kFirstScans || !is_predicted || !icp.converged || !is_possible(icp) ||
+        !limits.is_near(icp) || icp.matched < std::max(Matching::kFewestBesideNew, Matching::kFittingOfMet * icp.met))
+      return false;
+    const double seen =
+        icp.met + last_view_.contradicted(*map_, scan.points, icp.T_target_source, std::max(fine_m(), map_->voxel_m()));
+    return icp.matched >= std::max(Matching::kFittingOfSeen, typical_match_ - Matching::kBelowTypical) * seen;
+  };
   const auto fits = [&](const IcpResult& icp) {
-    return icp.converged && is_credible(icp.matched, icp.met, is_predicted) && is_possible(icp);
+    return icp.converged && is_possible(icp) && is_credible(icp.matched, icp.met, is_predicted);
   };
   IcpResult icp = align(radius_m, T_predicted);
   if (!is_possible(icp)) icp = align(std::min(radius_m, Matching::kNarrowSearch_m), T_predicted);
@@ -215,16 +212,15 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
     }
   // A turn or a jolt that was not predicted, or the end of one. After a gap anything may fit somehow: nothing is tried.
   // With a few of the points; where these fit better, all are aligned.
-  const bool follows = gap_s > 0.0 && gap_s <= Matching::kLongestGap_s;
   std::vector<Eigen::Vector3f> few;
   double best_of_few = 0.0;
-  const auto try_from = [&](const Pose& T_guess, double turn_deg) {
+  const auto try_from = [&](const Pose& T_tried, double turn_deg) {
     if (fits(icp)) return;
     if (few.empty())
       for (std::size_t i = 0; i < scan.points.size(); i += 1 + scan.points.size() / (2 * Matching::kFew))
         few.push_back(scan.points[i]);
     const IcpResult tried =
-        align_points(few, Matching::kFarSearch_m, T_guess * planar_pose(0.0, 0.0, to_radians(turn_deg)));
+        align_points(few, Matching::kFarSearch_m, T_tried * planar_pose(0.0, 0.0, to_radians(turn_deg)));
     if (tried.matched <= best_of_few) return;
     best_of_few = tried.matched;
     const IcpResult other = align(fine_m(), T_odom_lidar_.inverse() * tried.T_target_source);
@@ -236,15 +232,22 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
     try_from(T_predicted, turn_deg);
     try_from(Pose::Identity(), turn_deg);
   }
+  const IcpResult near = icp;
   // The longer ago it was tracked, the farther may it have turned; the nearest heading that fits is the answer.
   const double most_deg = std::min(180.0, Matching::kFastestTurn_degps * untracked_s);
-  for (double turn_deg = 0.0; follows && turn_deg <= most_deg; turn_deg += Matching::kTurnStep_deg) {
+  for (double turn_deg = 0.0; follows && scan.points.size() >= Matching::kFewestToTurn && turn_deg <= most_deg;
+       turn_deg += Matching::kTurnStep_deg) {
     try_from(T_tracked, turn_deg);
     if (turn_deg > 0.0) try_from(T_tracked, -turn_deg);
   }
+  bool is_tracked = fits(icp);
+  if (!is_tracked && fits_beside_new(near)) {
+    icp = near;
+    is_tracked = true;
+  }
   match.matched = icp.matched;
   match.met = icp.met;
-  match.is_tracked = fits(icp);
+  match.is_tracked = is_tracked;
   match.T_previous_found = T_odom_lidar_.inverse() * icp.T_target_source;
   const Pose error = T_predicted.inverse() * match.T_previous_found;
   match.prediction_error_m = error.translation().norm() + rotation_angle(error) * range_m_;
@@ -288,6 +291,7 @@ void ScanMatcher::accept(double stamp_s, const MatcherScan& scan, const ScanMatc
   untracked_m_ = match.is_tracked ? 0.0 : untracked_m_ + match.measured_m.value_or(0.0);
   if (match.is_tracked) {
     tracked_stamp_s_ = stamp_s;
+    last_view_.set(scan.map_points, match.T_odom_lidar);
     T_odom_tracked_ = match.T_odom_lidar;
   }
   ++scans_;

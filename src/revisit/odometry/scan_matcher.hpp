@@ -9,6 +9,7 @@
 #include <revisit/core/pose.hpp>
 #include <revisit/core/scan.hpp>
 #include <revisit/core/twist.hpp>
+#include <revisit/odometry/last_view.hpp>
 #include <revisit/odometry/local_map.hpp>
 
 namespace revisit {
@@ -76,7 +77,7 @@ class ScanMatcher {
     if (has_map && !map_) map_ = std::make_unique<LocalMap>(1.0, 1.0);  // of whatever size the archive says
     if (has_map) fields(*map_);
     fields(T_odom_lidar_, motion_, forgotten_from_, last_stamp_s_, range_m_, untracked_m_, T_odom_tracked_,
-           tracked_stamp_s_, squared_prediction_error_m2_, typical_match_, scans_, has_rings_);
+           tracked_stamp_s_, squared_prediction_error_m2_, typical_match_, scans_, has_rings_, last_view_);
   }
 
   bool has_map() const { return map_ != nullptr; }
@@ -103,6 +104,7 @@ class ScanMatcher {
   double typical_match_ = 0.0;                ///< running mean of the share that met the map
   int scans_ = 0;                             ///< in the map
   bool has_rings_ = false;
+  LastView last_view_;  ///< of the last scan that was tracked
 };
 
 }  // namespace revisit

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/odometry/scan_matcher.hpp>
 
+#include <cmath>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -149,6 +150,23 @@ TEST(ScanMatcher, WhatHardlyFixesAStepCannotMakeItLeap) {
     EXPECT_FALSE(step.is_tracked && step.T_previous_lidar.translation().norm() > 0.3)
         << "scan " << i << ": " << step.T_previous_lidar.translation().transpose();
   }
+}
+
+// 70 degrees wide, it turns by 12 degrees a scan: soon nothing of what it sees was in its first view.
+TEST(ScanMatcher, FollowsANarrowSensorThatTurns) {
+  ScanMatcher matcher;
+  const auto pose = [](int i) { return SyntheticWorld::at(0.02 * i, 0.0, to_radians(i < 8 ? 0.0 : 12.0 * (i - 8))); };
+  Pose T_found = Pose::Identity();
+  for (int i = 0; i < 24; ++i) {
+    std::vector<Point> points = seen_from(31, pose(i), static_cast<unsigned>(i));
+    std::erase_if(points, [](const Point& p) { return std::atan2(std::abs(p.y), p.x) > to_radians(35.0); });
+    const ScanMatch step = track(matcher, 0.1 * i, points);
+    EXPECT_TRUE(step.is_tracked) << "scan " << i << ", matched " << step.matched << " of " << step.met;
+    T_found = step.T_odom_lidar;
+  }
+  const Pose error = (pose(0).inverse() * pose(23)).inverse() * T_found;
+  EXPECT_LT(error.translation().norm(), 0.2);
+  EXPECT_LT(to_degrees(rotation_angle(error)), 1.0);
 }
 
 TEST(ScanMatcher, AStandingStartAndTimesThatStandStill) {
