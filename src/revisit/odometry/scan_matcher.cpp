@@ -47,8 +47,8 @@ struct Matching {
   static constexpr int kFirstScans = 5;
   static constexpr double kStart_m = 1.0;  ///< tried on every side
   static constexpr double kFewestMatchedAtFirst = 0.1, kFittingAtFirst = 0.6;
-  // Beside what is new: share of all points, of those that meet something, and of those that lie where was looked.
-  static constexpr double kFewestBesideNew = 0.15, kFittingOfMet = 0.7, kFittingOfSeen = 0.6;
+  // Beside what is new: share of all points and of those that meet something; and share of all that was seen through.
+  static constexpr double kFewestBesideNew = 0.15, kFittingBesideNew = 0.7, kMostContradicted = 0.06;
 
   static constexpr double kLongestGap_s = 1.0;  ///< beyond, the motion before says nothing about the motion now
   static constexpr double kLongestExtrapolation_s = 5.0;  ///< and is still a better guess than none
@@ -191,11 +191,11 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
   // A narrow sensor that turns, or one that comes round a corner, sees mostly what is new: of the rest, most must fit.
   const auto fits_beside_new = [&](const IcpResult& icp) {
     if (scans_ < Matching::kFirstScans || !is_predicted || !icp.converged || !is_possible(icp) ||
-        !limits.is_near(icp) || icp.matched < std::max(Matching::kFewestBesideNew, Matching::kFittingOfMet * icp.met))
+        !limits.is_near(icp) ||
+        icp.matched < std::max(Matching::kFewestBesideNew, Matching::kFittingBesideNew * icp.met))
       return false;
-    const double seen =
-        icp.met + last_view_.contradicted(*map_, scan.points, icp.T_target_source, std::max(fine_m(), map_->voxel_m()));
-    return icp.matched >= std::max(Matching::kFittingOfSeen, typical_match_ - Matching::kBelowTypical) * seen;
+    return last_view_.contradicted(*map_, scan.points, icp.T_target_source, std::max(fine_m(), map_->voxel_m())) <=
+           Matching::kMostContradicted;
   };
   const auto fits = [&](const IcpResult& icp) {
     return icp.converged && is_possible(icp) && is_credible(icp.matched, icp.met, is_predicted);
