@@ -8,6 +8,7 @@
 #include <spdlog/spdlog.h>
 
 #include <revisit/config/parameter_file.hpp>
+#include <revisit/core/text.hpp>
 #include <revisit/io/bag_topics.hpp>
 #include <revisit/io/calibration_file.hpp>
 #include <revisit/simulation/simulated_recording.hpp>
@@ -122,9 +123,28 @@ bool is_recording(const std::string& input) {
          has_topics(input);
 }
 
+namespace {
+
+// Where the recording is known to need it, and nobody has said otherwise.
+void correct_elevations(const Recording& recording, PreprocessOptions& preprocess) {
+  const double offset_deg = recording.elevation_offset_deg();
+  if (offset_deg == 0.0 || preprocess.elevation_offset_deg != 0.0) return;
+  preprocess.elevation_offset_deg = offset_deg;
+  print_log()(LogLevel::kInfo,
+              format("the sensor of this %s gives elevations %.3f degrees too low: corrected; another value: "
+                     "--preprocess.elevation_offset_deg",
+                     recording.kind().c_str(), offset_deg));
+}
+
+}  // namespace
+
 Result<std::unique_ptr<Recording>> open_input(const std::string& input, const RecordingOptions& options,
                                               Parameters* parameters) {
-  if (std::filesystem::path(input).extension() != ".toml") return open_recording(input, print_log(), options);
+  if (std::filesystem::path(input).extension() != ".toml") {
+    auto recording = open_recording(input, print_log(), options);
+    if (recording && parameters != nullptr) correct_elevations(**recording, parameters->preprocess);
+    return recording;
+  }
   if (!options.poses_file.empty())
     return Error{options.poses_file.string() + ": a simulated recording has its own, exact poses"};
   const auto described = read_parameter_file(input, {});

@@ -28,7 +28,7 @@ int calibrate(const CalibrateOptions& options) {
   const auto recording = open_input(options.input, options.recording.options(options.poses));
   if (!recording) return fail(recording.error());
   listen_for_interrupt();
-  Result<CalibrationReport> report = Error{};
+  Result<RecordingCalibration> report = Error{};
   {
     std::optional<Progress> progress;
     report = calibrate_recording(**recording, *parameters, options.scans, print_log(),
@@ -49,6 +49,9 @@ int calibrate(const CalibrateOptions& options) {
     const auto [least, most] = std::minmax_element(phi.ring_gains.begin(), phi.ring_gains.end());
     std::printf("%zu rings, gains %.3f to %.3f\n", phi.ring_gains.size(), *least, *most);
   }
+  if (report->elevation)
+    std::printf("elevations: %+.3f degrees to be added (standard deviation %.3f, %zu pairs of scans)\n",
+                report->elevation->offset_deg, report->elevation->deviation_deg, report->elevation->pairs);
   std::printf(
       "disagreement of %zu surface patches (half of them not learnt from): %.4f before, %.4f after (%.1f %% "
       "less)\n%s\n",
@@ -62,11 +65,15 @@ int calibrate(const CalibrateOptions& options) {
 Run add_calibrate(CLI::App& program) {
   auto options = std::make_shared<CalibrateOptions>();
   CLI::App* command = program.add_subcommand(
-      "calibrate", "Learn from a recording how intensity falls with distance, and how rings differ.");
+      "calibrate",
+      "Learn from a recording how intensity falls with distance, how rings differ, and whether elevations are off.");
   command->footer(
       "The same small surface seen from different distances should read the same. What makes it so is written to\n"
       "FILE, for `--calibration FILE` of detect and describe. The disagreement is measured on patches that were not\n"
-      "learnt from: 0 = a surface always reads the same, 1 = its reading says nothing.\n\n"
+      "learnt from: 0 = a surface always reads the same, 1 = its reading says nothing.\n"
+      "Of sensors with 60 rings and more, elevations are compared as well: flat ground must stay flat. What is "
+      "printed\n"
+      "may be given to every command as --preprocess.elevation_offset_deg.\n\n"
       "Example: revisit calibrate kitti/sequences/00 --out hdl64.json");
   command->add_option("recording", options->input, "Recording of a moving sensor")->required();
   command->add_option("--out", options->out, "The calibration to write (JSON)")->required();

@@ -110,14 +110,14 @@ Status localise_all(Localiser& localiser, const Recording& recording, bool each,
 }
 
 int localise(const LocaliseOptions& options) {
-  const auto parameters = options.parameters.resolve();
+  auto parameters = options.parameters.resolve();
   if (!parameters) return fail(parameters.error(), kUsage);
   if (!is_recording(options.input)) {
     auto localiser = Localiser::open(options.map, *parameters, print_log());
     return localiser ? localise_one(*localiser, options.input) : fail(localiser.error());
   }
   if (options.out.empty()) return fail({"a recording needs --out, the folder for the poses"}, kUsage);
-  const auto recording = open_input(options.input, options.recording.options());
+  const auto recording = open_input(options.input, options.recording.options(), &*parameters);
   if (!recording) return fail(recording.error());
   const auto scale = intensity_scale_of(**recording, parameters->intensity);
   if (!scale) return fail({scale.error().message + "; no scan can be used"});

@@ -42,6 +42,8 @@ const std::vector<Entry>& table() {
   static const std::vector<Entry> entries = {
       REVISIT_REAL(preprocess, min_range_m, 0, 20, "nearer returns are dropped: they are the vehicle itself"),
       REVISIT_REAL(preprocess, max_range_m, 5, 500, "farther returns are dropped: noise grows with distance"),
+      REVISIT_REAL(preprocess, elevation_offset_deg, -2, 2,
+                   "added to the elevation of every point; `revisit calibrate` finds it"),
       REVISIT_SWITCH(preprocess, remove_ground, "describe the scan without its ground"),
       REVISIT_REAL(intensity, full_scale, 0, 1e9, "raw intensity that becomes 1; 0 finds it from the first scans"),
       REVISIT_INTEGER(descriptor, rings, 1, 512, "N_r, radial bins of the polar grid"),

@@ -15,6 +15,8 @@ struct PreprocessOptions {
   double min_range_m = 1.0;    ///< nearer returns are the vehicle itself
   double max_range_m = 80.0;   ///< farther returns are noise
   bool remove_ground = false;  ///< describe the scan without its ground
+  /// Added to the elevation of every point: the HDL-64E of KITTI is off by 0.2 degrees. `revisit calibrate` finds it.
+  double elevation_offset_deg = 0.0;
 };
 
 /// How raw intensity becomes [0, 1], decided once a recording.

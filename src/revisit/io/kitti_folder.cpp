@@ -42,6 +42,14 @@ Result<Pose> read_kitti_calibration(const std::filesystem::path& file, const std
   return to_pose(file, M.leftCols<3>(), M.col(3));
 }
 
+bool is_calibration_of_kitti(const std::filesystem::path& file) {
+  for (const char* key : {"P0", "P_rect_00"})
+    if (const auto P = keyed_numbers(file, key, 12))
+      for (const double of_kitti : {718.856, 721.5377, 707.0912})  // of its three calibrations
+        if (std::abs((*P)[0] - of_kitti) < 1e-3) return true;
+  return false;
+}
+
 Result<Pose> read_kitti_raw_calibration(const std::filesystem::path& file) {
   const auto R = keyed_numbers(file, "R", 9);
   if (!R) return R.error();

@@ -42,6 +42,9 @@ class Recording {
   }
   /// Calibration of a KITTI camera, for pose files in its frame.
   virtual std::optional<Pose> T_camera_lidar() const = 0;
+  /// What is known to be missing from the elevations of its sensor, or 0 (PreprocessOptions::elevation_offset_deg): the
+  /// HDL-64E of KITTI, told by its own calibration files, gives them 0.205 degrees too low.
+  virtual double elevation_offset_deg() const { return 0.0; }
   /// What was found and assumed about stamps, point times and other sensors: a line each, for people.
   virtual std::vector<std::string> findings() const { return {}; }
 };

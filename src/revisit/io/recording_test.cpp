@@ -202,12 +202,27 @@ TEST(Recording, BrokenSideFilesOfAKittiFolderAreErrors) {
   EXPECT_NE(open_recording(folder).error().message.find("needs 12 numbers"), std::string::npos);
 }
 
+// The layout of KITTI is not its sensor.
+TEST(Recording, OnlyTheCarOfKittiHasItsElevations) {
+  const fs::path folder = fresh_folder();
+  fs::create_directories(folder / "velodyne");
+  write_bin(folder / "velodyne" / "000000.bin", 1.f);
+  const auto offset_deg = [&](const std::string& focal) {
+    const std::string rest = " 0 6 0 0 7 1 0 0 0 1 0\n";
+    std::ofstream(folder / "calib.txt") << "P0: " << focal << rest << "Tr: 0 -1 0 0 0 0 -1 0 1 0 0 0\n";
+    return (*open_recording(folder))->elevation_offset_deg();
+  };
+  EXPECT_EQ(offset_deg("7.188560000000e+02"), 0.205);
+  EXPECT_EQ(offset_deg("7.100000000000e+02"), 0.0);
+}
+
 TEST(Recording, KittiOdometryFolder) {
   REVISIT_NEEDS_SHARED_DATA();
   const auto recording = open_recording(shared_data() / "kitti00_mini");
   ASSERT_TRUE(recording) << recording.error().message;
   const Recording& r = **recording;
   EXPECT_EQ(r.size(), 27u);
+  EXPECT_EQ(r.elevation_offset_deg(), 0.205);
   EXPECT_TRUE(r.has_times());
   EXPECT_EQ(r.frame(26).value, 4501);
   EXPECT_NEAR(r.stamp_s(26), 466.5, 0.1);
@@ -228,6 +243,7 @@ TEST(Recording, KittiRawDrive) {
   ASSERT_TRUE(recording) << recording.error().message;
   const Recording& r = **recording;
   EXPECT_EQ(r.size(), 60u);
+  EXPECT_EQ(r.elevation_offset_deg(), 0.205);
   EXPECT_NEAR((r.stamp_s(59) - r.stamp_s(0)) / 59.0, 0.1034, 0.002);
   ASSERT_EQ(r.trajectory().entries.size(), 60u);
   EXPECT_LT(r.trajectory().at(FrameId{0})->translation().norm(), 1e-9);

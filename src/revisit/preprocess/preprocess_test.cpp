@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cmath>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
@@ -7,6 +8,19 @@
 
 namespace revisit {
 namespace {
+
+TEST(FilterRange, RaisesElevationsAndKeepsRangesAndAzimuths) {
+  PreprocessOptions options;
+  options.elevation_offset_deg = 0.5;
+  Scan scan;
+  scan.points = {{3.f, -4.f, -1.f, 0.f}, {0.f, 0.f, 5.f, 0.f}};
+  filter_range(scan, options);
+  const Point& p = scan.points[0];
+  EXPECT_NEAR(std::hypot(p.x, p.y, p.z), std::sqrt(26.f), 1e-5f);
+  EXPECT_NEAR(std::atan2(p.y, p.x), std::atan2(-4.f, 3.f), 1e-6f);
+  EXPECT_NEAR(std::atan2(p.z, std::hypot(p.x, p.y)), std::atan2(-1.f, 5.f) + 0.5f * 3.14159265f / 180.f, 1e-6f);
+  EXPECT_EQ(scan.points[1].z, 5.f) << "overhead there is no azimuth";
+}
 
 TEST(FilterRange, KeepsWhatLiesBetweenInOrder) {
   PreprocessOptions options;

@@ -2,8 +2,28 @@
 #include <revisit/preprocess/range_filter.hpp>
 
 #include <cmath>
+#include <vector>
+
+#include <revisit/core/pose.hpp>
 
 namespace revisit {
+namespace {
+
+// Turns each point upwards about the sensor's centre, at its own azimuth.
+void raise(std::vector<Point>& points, double offset_deg) {
+  const auto c = static_cast<float>(std::cos(to_radians(offset_deg)));
+  const auto s = static_cast<float>(std::sin(to_radians(offset_deg)));
+  for (Point& p : points) {
+    const float across = std::hypot(p.x, p.y);
+    if (across == 0.f) continue;
+    const float scale = c - s * p.z / across;
+    p.z = c * p.z + s * across;
+    p.x *= scale;
+    p.y *= scale;
+  }
+}
+
+}  // namespace
 
 void filter_range(Scan& scan, const PreprocessOptions& options) {
   require_consistent(scan);
@@ -26,6 +46,7 @@ void filter_range(Scan& scan, const PreprocessOptions& options) {
     kept += static_cast<std::size_t>((range2 > 0.f) & (range2 >= min2) & (range2 <= max2));
   }
   scan.points.resize(kept);
+  if (options.elevation_offset_deg != 0.0) raise(scan.points, options.elevation_offset_deg);
   if (rings != nullptr) scan.rings.resize(kept);
   if (times != nullptr) scan.times_s.resize(kept);
 }

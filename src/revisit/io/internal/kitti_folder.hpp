@@ -16,6 +16,10 @@ namespace revisit::io_internal {
 /// Row `key` of a KITTI calib.txt, 3 x 4, e.g. "Tr" (LiDAR to camera 0).
 Result<Pose> read_kitti_calibration(const std::filesystem::path& file, const std::string& key);
 
+/// Whether the cameras of a calib.txt or a calib_cam_to_cam.txt are those of KITTI's car, as the focal length of the
+/// first one tells: others write their recordings in its layout, too.
+bool is_calibration_of_kitti(const std::filesystem::path& file);
+
 /// The rows R: and T: of KITTI raw's calib_imu_to_velo.txt.
 Result<Pose> read_kitti_raw_calibration(const std::filesystem::path& file);
 
