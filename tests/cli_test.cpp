@@ -137,7 +137,8 @@ TEST(Cli, CompareRunsEachMethodOverTheSameScans) {
   const Outcome all = run("compare " + drive.string() + exclusion + " --out " + out.string());
   ASSERT_EQ(all.code, 0) << all.output;
   for (const char* method : {"revisit", "revisit-retrieval", "isc-paper", "isc-program", "scan-context-ring-key",
-                             "scan-context", "scan-context++", "m2dp", "glarot3d", "lidar-iris", "ring", "solid"}) {
+                             "scan-context", "scan-context++", "m2dp", "glarot3d", "lidar-iris", "nbld", "ring",
+                             "ring++", "contour-context", "std", "btc", "solid"}) {
     EXPECT_NE(all.output.find(method), std::string::npos) << all.output;
     EXPECT_TRUE(fs::exists(out / method / "candidates.csv")) << method;
   }
@@ -150,6 +151,8 @@ TEST(Cli, CompareRunsEachMethodOverTheSameScans) {
   for (const CandidateRow& row : *answers) EXPECT_LE(row.match->value, row.query.value - 3);
 
   EXPECT_NE(content(out / "comparison.tex").find("scan-context++ &"), std::string::npos);
+  EXPECT_NE(all.output.find("6-DoF"), std::string::npos) << all.output;
+  EXPECT_NE(content(out / "comparison.csv").find(",3-DoF,1,"), std::string::npos);
 
   // What Scan Context answers is registered as ours is; answers from elsewhere are judged beside it.
   const fs::path verified = folder / "verified";

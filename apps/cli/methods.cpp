@@ -65,9 +65,13 @@ Methods::Methods(const Options& options, const Parameters& parameters, const Int
     add(kPaper, "Wang et al., ICRA 2020, as in the paper (preset `paper`)").detector_ =
         std::make_unique<LoopDetector>(as_printed, scale);
   }
+  std::size_t most_scans = 0;  // 0: nobody wants more than one
   for (auto& baseline : make_baselines()) {
     if (!is_wanted(baseline->name())) continue;
     Method& method = add(baseline->name(), baseline->source());
+    method.report.gives = baseline->gives();
+    method.report.scans = baseline->scans();
+    if (baseline->scans() > 1) most_scans = std::max(most_scans, baseline->scans());
     method.baseline_ = std::make_unique<BaselineSearch>(std::move(baseline), parameters.retrieval);
     if (!options.verifies_all) continue;
     method.places_ = places();
@@ -75,15 +79,21 @@ Methods::Methods(const Options& options, const Parameters& parameters, const Int
       return method.row_ && method.row_->match ? std::vector{*method.row_->match} : std::vector<FrameId>{};
     });
   }
-  for (auto& method : all_) method->report.gives_poses = method->places_ || method->detector_;
+  recent_ = RecentScans(most_scans);
+  for (auto& method : all_) {
+    method->report.is_verified = method->places_ || method->detector_;
+    if (!method->baseline_ && method->report.is_verified) method->report.gives = Baseline::Gives::kPose;
+  }
 }
 
 Status Methods::answer(const Scan& scan) {
   const auto step = front_end_.step(scan);
+  if (step) recent_.add(step->scan);
   const TypicalAgreement typical = front_end_.typical().recent();
   std::vector<Status> statuses(all_.size(), ok());
-  tbb::parallel_for(std::size_t{0}, all_.size(),
-                    [&](std::size_t i) { statuses[i] = all_[i]->answer(scan, step ? &step->scan : nullptr, typical); });
+  tbb::parallel_for(std::size_t{0}, all_.size(), [&](std::size_t i) {
+    statuses[i] = all_[i]->answer(scan, step ? &step->scan : nullptr, recent_, typical);
+  });
   const auto failed = std::find_if(statuses.begin(), statuses.end(), [](const Status& status) { return !status; });
   return failed == statuses.end() ? ok() : *failed;
 }
@@ -95,7 +105,8 @@ Status Method::open(const std::filesystem::path& folder, ResultWriter::Existing 
   return ok();
 }
 
-Status Method::answer(const Scan& raw, const PreparedScan* prepared, const TypicalAgreement& typical) {
+Status Method::answer(const Scan& raw, const PreparedScan* prepared, const RecentScans& recent,
+                      const TypicalAgreement& typical) {
   Status status = ok();
   one_thread_->execute([&] {
     if (detector_) {
@@ -108,18 +119,26 @@ Status Method::answer(const Scan& raw, const PreparedScan* prepared, const Typic
     }
     if (!prepared) return;
     if (index_) status = search(*prepared);
-    if (baseline_) status = retrieve(*prepared);
+    if (baseline_) status = retrieve(*prepared, recent);
     if (status && places_) status = recognise(*prepared, typical);
   });
   return status;
 }
 
-Status Method::retrieve(const PreparedScan& scan) {
+Status Method::retrieve(const PreparedScan& scan, const RecentScans& recent) {
+  const std::size_t scans = baseline_->method().scans();
+  const std::vector<Point> together = scans > 1 ? recent.together(scans) : std::vector<Point>{};
+  const std::vector<Point>& points = scans > 1 ? together : scan.scan.points;
+  std::optional<BaselineSearch::Answer> answer;
   report.retrieval_ms += time_ms([&] {
-    row_ = baseline_->process({scan.scan.frame, scan.scan.stamp_s}, scan.scan.points, scan.ground_z_m);
+    answer = baseline_->process({scan.scan.frame, scan.scan.stamp_s}, points, scan.ground_z_m);
   });
   report.bytes_a_place = baseline_->bytes_a_place();
-  return row_ ? writer_->add(*row_) : ok();
+  row_.reset();
+  if (!answer) return ok();
+  row_ = std::move(answer->row);
+  if (row_->match) given_poses.push_back({row_->query, *row_->match, answer->T_match_query});
+  return writer_->add(*row_);
 }
 
 Status Method::search(const PreparedScan& scan) {
@@ -158,7 +177,9 @@ Status Method::write(const Detection& detection, const std::optional<CandidateRo
   if (detection.searchable_places == 0) return ok();
   if (row)
     if (const Status status = writer_->add(*row); !status) return status;
-  return detection.loop ? writer_->add(*detection.loop) : ok();
+  if (!detection.loop) return ok();
+  if (!baseline_) given_poses.push_back({detection.loop->query, detection.loop->match, detection.loop->T_match_query});
+  return writer_->add(*detection.loop);
 }
 
 }  // namespace revisit::cli

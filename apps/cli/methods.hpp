@@ -9,10 +9,12 @@
 
 #include <oneapi/tbb/task_arena.h>
 
+#include <revisit/evaluation/given_pose_table.hpp>
 #include <revisit/io/result_files.hpp>
 #include <revisit/pipeline/detection_front_end.hpp>
 #include <revisit/pipeline/loop_detector.hpp>
 #include <revisit/pipeline/place_recognition.hpp>
+#include <revisit/pipeline/recent_scans.hpp>
 #include <revisit/retrieval/baseline_search.hpp>
 
 #include "reports/comparison.hpp"
@@ -24,15 +26,17 @@ namespace revisit::cli {
 class Method {
  public:
   MethodReport report;  ///< what it cost is added up meanwhile
+  std::vector<GivenPose> given_poses;
 
-  /// `raw` as the recording has it; `prepared`: null where the scan describes no place.
-  Status answer(const Scan& raw, const PreparedScan* prepared, const TypicalAgreement& typical);
+  /// `raw` as the recording has it; `prepared`: null where the scan describes no place; `recent`: up to it.
+  Status answer(const Scan& raw, const PreparedScan* prepared, const RecentScans& recent,
+                const TypicalAgreement& typical);
   Status open(const std::filesystem::path& folder, ResultWriter::Existing existing);
   Status finish() { return writer_->finish(); }
 
  private:
   friend class Methods;
-  Status retrieve(const PreparedScan& scan);
+  Status retrieve(const PreparedScan& scan, const RecentScans& recent);
   Status search(const PreparedScan& scan);
   Status recognise(const PreparedScan& scan, const TypicalAgreement& typical);
   Status write(const Detection& detection, const std::optional<CandidateRow>& row);
@@ -66,6 +70,7 @@ class Methods {
   Method& add(const std::string& name, const std::string& source);
 
   DetectionFrontEnd front_end_;
+  RecentScans recent_{0};
   std::vector<std::unique_ptr<Method>> all_;
 };
 

@@ -76,6 +76,8 @@ Result<std::vector<MethodReport>> evaluate_all(Methods& methods, const Recording
     if (!evaluation) return evaluation.error();
     MethodReport& report = reports.emplace_back(std::move(method->report));
     report.evaluation = *std::move(evaluation);
+    report.poses =
+        evaluate_given_poses(method->given_poses, reference, method->report.gives == Baseline::Gives::kPlanarPose);
     report.retrieval_ms /= scans;
     report.verification_ms /= scans;
   }

@@ -6,6 +6,8 @@
 #include <vector>
 
 #include <revisit/core/result.hpp>
+#include <revisit/descriptors/baseline.hpp>
+#include <revisit/evaluation/given_pose_table.hpp>
 
 #include "reports/report.hpp"
 
@@ -14,11 +16,14 @@ namespace revisit::cli {
 /// One method's tables 1 and 2, and what it is.
 struct MethodReport {
   std::string name, source;
-  bool gives_poses = false;      ///< otherwise there is no table 2
+  bool is_verified = false;  ///< otherwise there is no table 2
+  Baseline::Gives gives = Baseline::Gives::kPlace;
+  std::size_t scans = 1;         ///< described together; more than one are laid together by odometry
   double retrieval_ms = 0.0;     ///< describing and searching, a scan, on one thread
   double verification_ms = 0.0;  ///< likewise
   std::size_t bytes_a_place = 0;
   EvaluationReport evaluation;
+  GivenPoseTable poses;  ///< what its right answers say of the pose
 };
 
 /// All methods in one table each, a row a method.

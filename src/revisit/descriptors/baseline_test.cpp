@@ -13,27 +13,40 @@
 namespace revisit {
 namespace {
 
-// Walls and poles around a sensor 1.7 m above the ground, other ones for another seed.
+// Walls on flat ground around a sensor 1.7 m above the ground, other ones for another seed.
 std::vector<Point> made_place(unsigned seed) {
   std::mt19937 random(seed);
-  std::uniform_real_distribution<float> turn(-3.14159f, 3.14159f), range(5.f, 35.f), top(0.f, 8.f), shine(0.f, 1.f);
+  std::uniform_real_distribution<float> turn(-3.14159f, 3.14159f), range(5.f, 35.f), top(0.f, 8.f), shine(0.f, 1.f),
+      length(0.5f, 9.f);
   std::vector<Point> points;
   for (int thing = 0; thing < 60; ++thing) {
     const float azimuth = turn(random), r = range(random), height = top(random), intensity = shine(random);
-    for (int column = 0; column < 12; ++column)
-      for (float z = -0.8f; z < height; z += 0.25f) {
-        const float a = azimuth + 0.01f * static_cast<float>(column);
-        points.push_back({r * std::cos(a), r * std::sin(a), z, intensity});
-      }
+    const float heading = turn(random), half_m = length(random) / 2.f;
+    for (float along = -half_m; along <= half_m; along += 0.2f)
+      for (float z = -0.8f; z < height; z += 0.25f)
+        points.push_back({r * std::cos(azimuth) + along * std::cos(heading),
+                          r * std::sin(azimuth) + along * std::sin(heading), z, intensity});
   }
+  for (float x = -40.f; x < 40.f; x += 0.6f)
+    for (float y = -40.f; y < 40.f; y += 0.6f) points.push_back({x, y, -1.7f, 0.3f});
   return points;
 }
 
+// As seen from a sensor that is turned by -yaw.
 std::vector<Point> turned(std::vector<Point> points, double yaw_rad) {
   const auto c = static_cast<float>(std::cos(yaw_rad)), s = static_cast<float>(std::sin(yaw_rad));
   for (Point& p : points) p = {c * p.x - s * p.y, s * p.x + c * p.y, p.z, p.intensity};
   return points;
 }
+
+// As seen from a sensor that stands elsewhere.
+std::vector<Point> moved(std::vector<Point> points, float x_m, float y_m) {
+  for (Point& p : points) p.x -= x_m, p.y -= y_m;
+  return points;
+}
+
+// STD cuts the place into cubes: other ones, unless it is turned by a right angle.
+double large_turn_rad(const Baseline& method) { return to_radians(method.name() == "std" ? 90.0 : 66.0); }
 
 class EachBaseline : public testing::TestWithParam<std::size_t> {
  protected:
@@ -42,7 +55,7 @@ class EachBaseline : public testing::TestWithParam<std::size_t> {
 
 TEST_P(EachBaseline, FindsThePlaceAgainWhenTurned) {
   // Principal axes may come out with the other sign: of M2DP only a slight turn is asked.
-  const double yaw_rad = to_radians(method->name() == "m2dp" ? 3.0 : 66.0);
+  const double yaw_rad = method->name() == "m2dp" ? to_radians(1.0) : large_turn_rad(*method);
   std::vector<Baseline::Signature> places;
   for (unsigned seed = 0; seed < 12; ++seed) places.push_back(method->describe(made_place(seed), -1.7));
   for (unsigned seed = 0; seed < 12; ++seed) {
@@ -64,6 +77,25 @@ TEST_P(EachBaseline, APlaceIsMostLikeItself) {
   if (method->name() != "m2dp") {  // which centres the cloud
     EXPECT_GT(method->similarity(method->describe(far, -1.7), a), 0.99 * method->similarity(a, a));
   }
+}
+
+TEST_P(EachBaseline, SaysHowTheQueryLiesToThePlace) {
+  const auto place = method->describe(made_place(1), -1.7);
+  const bool is_moved = method->gives() >= Baseline::Gives::kPlanarPose;
+  // T_place_query: the query's sensor heads so far to the right, 4 m ahead and 2 m to the right of the place's.
+  const auto query = method->describe(
+      turned(is_moved ? moved(made_place(1), 4.f, -2.f) : made_place(1), large_turn_rad(*method)), -1.7);
+  const Pose T_place_query = method->T_place_query(query, place);
+  if (method->gives() == Baseline::Gives::kPlace) {
+    EXPECT_TRUE(T_place_query.isApprox(Pose::Identity()));
+    return;
+  }
+  EXPECT_NEAR(to_degrees(yaw_of(T_place_query) + large_turn_rad(*method)), 0.0,
+              method->name().starts_with("isc-paper") ? 9.0 : 3.0);
+  if (!is_moved) return;
+  EXPECT_NEAR(T_place_query.translation().x(), 4.0, 0.5);
+  EXPECT_NEAR(T_place_query.translation().y(), -2.0, 0.5);
+  EXPECT_NEAR(T_place_query.translation().z(), 0.0, 0.1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, EachBaseline, testing::Range(std::size_t{0}, make_baselines().size()),
@@ -90,11 +122,6 @@ TEST(ScanContextBaseline, TurnedByWholeSectorsItIsTheSame) {
   EXPECT_NEAR(method->similarity(place, shifted), 1.0, 1e-5);
 }
 
-std::vector<Point> moved(std::vector<Point> points, float x_m, float y_m) {
-  for (Point& p : points) p.x -= x_m, p.y -= y_m;
-  return points;
-}
-
 // A lane beside: what Scan Context++ was made for.
 TEST(ScanContextPlusPlusBaseline, ALaneBesideItIsMoreAlikeThanScanContext) {
   const auto augmented = baseline_of("scan-context++"), plain = baseline_of("scan-context");
@@ -112,8 +139,8 @@ TEST(RingBaseline, AMovedPlaceIsTheSame) {
   const auto place = method->describe(made_place(5), -1.7), other = method->describe(made_place(6), -1.7);
   const float cell_m = 140.f / 120.f;
   const auto query = method->describe(moved(made_place(5), 4 * cell_m, -3 * cell_m), -1.7);
-  EXPECT_GT(method->similarity(query, place), 0.9);
-  EXPECT_GT(method->similarity(query, place), method->similarity(query, other) + 0.05);
+  EXPECT_GT(method->similarity(query, place), 0.7);
+  EXPECT_GT(method->similarity(query, place), method->similarity(query, other) + 0.3);
 }
 
 TEST(LidarIrisBaseline, TurnedByWholeColumnsItIsTheSame) {
@@ -134,11 +161,11 @@ TEST(Glarot3dBaseline, AMovedPlaceIsTheSame) {
   EXPECT_LT(method->similarity(query, method->describe(made_place(9), -1.7)), 0.8);
 }
 
-TEST(SolidBaseline, TurnsDoNotMatterAndItKeepsFortyNumbers) {
+TEST(SolidBaseline, TurnsDoNotMatterAndItKeepsAHundredNumbers) {
   const auto method = baseline_of("solid");
   const auto place = made_place(10);
   const auto signature = method->describe(place, -1.7);
-  EXPECT_EQ(signature.bytes(), 40 * sizeof(float));
+  EXPECT_EQ(signature.bytes(), (40 + 60) * sizeof(float));
   EXPECT_NEAR(method->similarity(signature, method->describe(turned(place, to_radians(66.0)), -1.7)), 1.0, 0.02);
 }
 

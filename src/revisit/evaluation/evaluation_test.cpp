@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <revisit/evaluation/given_pose_table.hpp>
 #include <revisit/evaluation/loop_table.hpp>
 #include <revisit/evaluation/retrieval_table.hpp>
 
@@ -35,6 +36,30 @@ TEST(Reference, FindsRevisitsByDistanceFramesAndTime) {
   EXPECT_EQ(reference.reverse_revisits(), 77u);
   EXPECT_EQ(reference.revisits().at(FrameId{150}).nearest.value, 49);
   EXPECT_TRUE(there_and_back(4.1).revisits().empty());
+}
+
+TEST(GivenPoseTable, CountsByHand) {
+  const Reference reference = there_and_back();
+  const auto given = [](int query, int match, Pose T_match_query) {
+    return GivenPose{FrameId{query}, FrameId{match}, T_match_query};
+  };
+  Pose high = at(0.2, 0.0, 180.0);
+  high.translation().z() = 0.6;
+  const std::vector<GivenPose> poses = {given(150, 49, at(0.1, 0.0, 178.0)),   // right
+                                        given(151, 38, at(10.3, 0.0, 180.0)),  // right, though of a frame 10 m away
+                                        given(152, 47, at(0.0, 0.6, 180.0)),   // too far off
+                                        given(153, 46, at(0.0, 0.0, 90.0)),    // turned
+                                        given(154, 45, high),                  // right in the plane
+                                        given(110, 89, at(0.0, 0.0, 180.0))};  // no revisit: too soon
+  const GivenPoseTable table = evaluate_given_poses(poses, reference, false);
+  EXPECT_EQ(table.revisits, 77u);
+  EXPECT_EQ(table.right, 2u);
+  EXPECT_EQ(table.answers, 5u);
+  EXPECT_NEAR(table.p95_yaw_deg, 90.0, 1e-9);
+  EXPECT_NEAR(table.median_yaw_deg, 0.0, 1e-9);
+  EXPECT_NEAR(table.p95_plane_m, 0.6, 1e-9);
+  EXPECT_NEAR(table.p95_height_m, 0.6, 1e-9);
+  EXPECT_EQ(evaluate_given_poses(poses, reference, true).right, 3u);
 }
 
 CandidateRow answer(int query, int match, double score) { return {FrameId{query}, FrameId{match}, score, false, ""}; }

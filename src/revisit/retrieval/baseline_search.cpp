@@ -11,6 +11,7 @@
 namespace revisit {
 
 std::vector<std::size_t> BaselineSearch::shortlist(const Place& query, std::size_t searchable) const {
+  if (index_) return index_->look_up(query.signature, searchable);
   std::vector<std::size_t> all(searchable);
   std::iota(all.begin(), all.end(), std::size_t{0});
   const std::size_t wanted = method_->nearest_keys();
@@ -24,8 +25,29 @@ std::vector<std::size_t> BaselineSearch::shortlist(const Place& query, std::size
   return all;
 }
 
-std::optional<CandidateRow> BaselineSearch::process(const FrameTime& query_frame, std::span<const Point> points,
-                                                    double ground_z_m) {
+BaselineSearch::Answer BaselineSearch::answer(const Place& query, std::size_t searchable) const {
+  const std::vector<std::size_t> compared = shortlist(query, searchable);
+  std::vector<double> similarity(compared.size());
+  tbb::parallel_for(std::size_t{0}, compared.size(), [&](std::size_t i) {
+    similarity[i] = method_->similarity(query.signature, places_[compared[i]].signature);
+  });
+  const auto best = std::max_element(similarity.begin(), similarity.end());
+  Answer answer;
+  answer.row.query = query.frame.frame;
+  if (best == similarity.end() || *best <= 0.0) {
+    answer.row.reason = to_text(Refusal{Refusal::Reason::kNoCandidate});
+    return answer;
+  }
+  const Place& match = places_[compared[static_cast<std::size_t>(best - similarity.begin())]];
+  answer.row.match = match.frame.frame;
+  answer.row.score = *best;
+  answer.row.reason = to_text(Refusal{Refusal::Reason::kNoPose});
+  answer.T_match_query = method_->T_place_query(query.signature, match.signature);
+  return answer;
+}
+
+std::optional<BaselineSearch::Answer> BaselineSearch::process(const FrameTime& query_frame,
+                                                              std::span<const Point> points, double ground_z_m) {
   Place query;
   query.frame = query_frame;
   if (!places_.empty()) query.frame.stamp_s = std::max(query_frame.stamp_s, places_.back().frame.stamp_s);
@@ -35,24 +57,12 @@ std::optional<CandidateRow> BaselineSearch::process(const FrameTime& query_frame
   const auto too_recent = std::partition_point(
       places_.begin(), places_.end(), [&](const Place& place) { return exclusion_.allows(query_frame, place.frame); });
   const auto searchable = static_cast<std::size_t>(too_recent - places_.begin());
-  std::optional<CandidateRow> row;
-  if (searchable > 0) {
-    const std::vector<std::size_t> compared = shortlist(query, searchable);
-    std::vector<double> similarity(compared.size());
-    tbb::parallel_for(std::size_t{0}, compared.size(), [&](std::size_t i) {
-      similarity[i] = method_->similarity(query.signature, places_[compared[i]].signature);
-    });
-    const auto best = std::max_element(similarity.begin(), similarity.end());
-    row.emplace();
-    row->query = query_frame.frame;
-    row->match = places_[compared[static_cast<std::size_t>(best - similarity.begin())]].frame.frame;
-    row->score = *best;
-    row->reason = to_text(Refusal{Refusal::Reason::kNoPose});
-  }
+  const auto found = searchable > 0 ? std::optional(answer(query, searchable)) : std::nullopt;
   query.signature = method_->kept(std::move(query.signature));
   bytes_ += query.signature.bytes() + static_cast<std::size_t>(query.key.size()) * sizeof(float);
   places_.push_back(std::move(query));
-  return row;
+  if (index_) index_->add(places_.back().signature);
+  return found;
 }
 
 }  // namespace revisit

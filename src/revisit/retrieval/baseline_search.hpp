@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <deque>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -12,20 +14,26 @@
 
 namespace revisit {
 
-/// Places by a published descriptor: answers each scan with the place most like it, however little that is, and adds
-/// the scan. Frames increase. Belongs to one thread at a time.
+/// Places by a published descriptor: answers each scan with the place most like it, however little that is (but none
+/// where a similarity is 0), and adds the scan. Frames increase. Belongs to one thread at a time.
 class BaselineSearch {
  public:
   BaselineSearch(std::unique_ptr<Baseline> method, const ExclusionRule& exclusion)
-      : method_(std::move(method)), exclusion_(exclusion) {}
+      : method_(std::move(method)), index_(method_->make_index()), exclusion_(exclusion) {}
 
   /// `points`: prepared, as Baseline::describe() takes them. None where no place is old enough. Every answer counts as
   /// refused: there is no threshold.
-  std::optional<CandidateRow> process(const FrameTime& query, std::span<const Point> points, double ground_z_m);
+  struct Answer {
+    CandidateRow row;
+    Pose T_match_query = Pose::Identity();  ///< as far as the method gives it
+  };
+  std::optional<Answer> process(const FrameTime& query, std::span<const Point> points, double ground_z_m);
 
   const Baseline& method() const { return *method_; }
   /// What the method keeps, in the mean.
-  std::size_t bytes_a_place() const { return places_.empty() ? 0 : bytes_ / places_.size(); }
+  std::size_t bytes_a_place() const {
+    return places_.empty() ? 0 : (bytes_ + (index_ ? index_->bytes() : 0)) / places_.size();
+  }
 
  private:
   struct Place {
@@ -35,10 +43,12 @@ class BaselineSearch {
   };
   /// The places that are compared, out of the first `searchable`.
   std::vector<std::size_t> shortlist(const Place& query, std::size_t searchable) const;
+  Answer answer(const Place& query, std::size_t searchable) const;
 
   std::unique_ptr<Baseline> method_;
+  std::unique_ptr<BaselineIndex> index_;  ///< null: places are compared by their keys, or all of them
   ExclusionRule exclusion_;
-  std::vector<Place> places_;
+  std::deque<Place> places_;
   std::size_t bytes_ = 0;  ///< of all signatures and keys
 };
 

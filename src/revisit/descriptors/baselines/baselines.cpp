@@ -3,6 +3,8 @@
 
 namespace revisit {
 
+std::unique_ptr<BaselineIndex> Baseline::make_index() const { return nullptr; }
+
 std::vector<std::unique_ptr<Baseline>> make_baselines() {
   using namespace descriptors_internal;
   std::vector<std::unique_ptr<Baseline>> all;
@@ -14,7 +16,12 @@ std::vector<std::unique_ptr<Baseline>> make_baselines() {
   all.push_back(make_m2dp());
   all.push_back(make_glarot3d());
   all.push_back(make_lidar_iris());
+  all.push_back(make_landmark_density());
   all.push_back(make_ring());
+  all.push_back(make_ring_pp());
+  all.push_back(make_contour_context());
+  all.push_back(make_stable_triangle());
+  all.push_back(make_binary_triangle());
   all.push_back(make_solid());
   return all;
 }

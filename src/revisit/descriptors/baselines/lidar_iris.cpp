@@ -81,16 +81,27 @@ class LidarIris final : public Baseline {
     return signature;
   }
 
+  Gives gives() const override { return Gives::kYaw; }
   double similarity(const Signature& query, const Signature& place) const override {
-    Eigen::Index turn = 0;  // column j of the query lies on column j + turn of the place
-    circular_correlation(query.values, place.values, kAzimuths).maxCoeff(&turn);
-    double best = 0.0;
-    for (int offset = -kReach; offset <= kReach; ++offset)
-      best = std::max(best, alike(query.bits, place.bits, (static_cast<int>(turn) + offset + kAzimuths) % kAzimuths));
-    return best;
+    return best_turn(query, place).similarity;
+  }
+  Pose T_place_query(const Signature& query, const Signature& place) const override {
+    return best_turn(query, place).T_place_query(kAzimuths);
   }
 
  private:
+  static Turn best_turn(const Signature& query, const Signature& place) {
+    Eigen::Index turn = 0;  // column j of the query lies on column j + turn of the place
+    circular_correlation(query.values, place.values, kAzimuths).maxCoeff(&turn);
+    Turn best;
+    for (int offset = -kReach; offset <= kReach; ++offset) {
+      const int columns = (static_cast<int>(turn) + offset + kAzimuths) % kAzimuths;
+      const double share = alike(query.bits, place.bits, columns);
+      if (share > best.similarity) best = {share, columns};
+    }
+    return best;
+  }
+
   // The bit of the real part is `first` of its column, that of the imaginary part the next.
   static void set_bits(std::vector<std::uint64_t>& bits, const std::vector<Complex>& response, std::size_t first) {
     for (std::size_t column = 0; column < kAzimuths; ++column) {

@@ -54,9 +54,17 @@ class PaperIsc final : public Baseline {
     return {std::move(image), {}};
   }
 
+  Gives gives() const override { return Gives::kYaw; }
   double similarity(const Signature& query, const Signature& place) const override {
-    const IntensityScanContext a = to_context(query.values), b = to_context(place.values);
-    return match_descriptors(a, b).score();
+    return match(query, place).score();
+  }
+  Pose T_place_query(const Signature& query, const Signature& place) const override {
+    return planar_pose(0.0, 0.0, match(query, place).yaw_rad);
+  }
+
+ private:
+  static LoopCandidate match(const Signature& query, const Signature& place) {
+    return match_descriptors(to_context(query.values), to_context(place.values));
   }
 };
 

@@ -47,7 +47,16 @@ class PublishedIsc final : public Baseline {
     return {std::move(image), {}};
   }
 
-  double similarity(const Signature& query_signature, const Signature& place_signature) const override {
+  Gives gives() const override { return Gives::kYaw; }
+  double similarity(const Signature& query, const Signature& place) const override {
+    return best_turn(query, place).similarity;
+  }
+  Pose T_place_query(const Signature& query, const Signature& place) const override {
+    return best_turn(query, place).T_place_query(kSectors);
+  }
+
+ private:
+  static Turn best_turn(const Signature& query_signature, const Signature& place_signature) {
     const Eigen::MatrixXf &query = query_signature.values, &place = place_signature.values;
     const auto empty_q = cells_that_hold(0.f, query), empty_p = cells_that_hold(0.f, place);
     const auto one_q = cells_that_hold(1.f, query), one_p = cells_that_hold(1.f, place);
@@ -68,7 +77,7 @@ class PublishedIsc final : public Baseline {
                                (query.rightCols(first) - place.leftCols(first)).cwiseAbs().sum();
       intensity = std::max(intensity, 1.0 - static_cast<double>(difference) / (255.0 * kCells));
     }
-    return static_cast<double>(geometry) / kCells + intensity;
+    return {static_cast<double>(geometry) / kCells + intensity, best_shift};
   }
 };
 

@@ -32,24 +32,12 @@ class ScanContext final : public Baseline {
     return {polar_heights(points, ground_z_m), {}};
   }
 
+  Gives gives() const override { return Gives::kYaw; }
   double similarity(const Signature& query, const Signature& place) const override {
-    // Columns of unit length, so that a cosine is one product; empty columns stay zero.
-    const Eigen::VectorXf query_scale = inverse_lengths(query.values), place_scale = inverse_lengths(place.values);
-    const Eigen::Matrix<float, kSectors, kSectors> cosines =
-        query_scale.asDiagonal() * (query.values.transpose() * place.values) * place_scale.asDiagonal();
-    double best = 0.0;
-    for (int shift = 0; shift < kSectors; ++shift) {
-      // A cosine with an empty column is not defined: such pairs do not count.
-      double sum = 0.0;
-      int columns = 0;
-      for (int j = 0; j < kSectors; ++j) {
-        const int k = j + shift < kSectors ? j + shift : j + shift - kSectors;
-        sum += static_cast<double>(cosines(j, k));
-        columns += query_scale[j] > 0.f && place_scale[k] > 0.f;
-      }
-      if (columns > 0) best = std::max(best, sum / columns);
-    }
-    return best;
+    return best_turn(query, place).similarity;
+  }
+  Pose T_place_query(const Signature& query, const Signature& place) const override {
+    return best_turn(query, place).T_place_query(kSectors);
   }
 
   Eigen::VectorXf key(const Signature& signature) const override {
@@ -59,6 +47,26 @@ class ScanContext final : public Baseline {
   std::size_t nearest_keys() const override { return nearest_ring_keys_; }
 
  private:
+  static Turn best_turn(const Signature& query, const Signature& place) {
+    // Columns of unit length, so that a cosine is one product; empty columns stay zero.
+    const Eigen::VectorXf query_scale = inverse_lengths(query.values), place_scale = inverse_lengths(place.values);
+    const Eigen::Matrix<float, kSectors, kSectors> cosines =
+        query_scale.asDiagonal() * (query.values.transpose() * place.values) * place_scale.asDiagonal();
+    Turn best;
+    for (int shift = 0; shift < kSectors; ++shift) {
+      // A cosine with an empty column is not defined: such pairs do not count.
+      double sum = 0.0;
+      int columns = 0;
+      for (int j = 0; j < kSectors; ++j) {
+        const int k = j + shift < kSectors ? j + shift : j + shift - kSectors;
+        sum += static_cast<double>(cosines(j, k));
+        columns += query_scale[j] > 0.f && place_scale[k] > 0.f;
+      }
+      if (columns > 0 && sum / columns > best.similarity) best = {sum / columns, shift};
+    }
+    return best;
+  }
+
   std::size_t nearest_ring_keys_;
 };
 

@@ -64,17 +64,29 @@ class ScanContextPlusPlus final : public Baseline {
     return {signature.values.leftCols(signature.values.cols() / static_cast<Eigen::Index>(kLeft_m.size())), {}};
   }
 
+  Gives gives() const override { return Gives::kYaw; }
   double similarity(const Signature& query, const Signature& place) const override {
+    return best_turn(query, place).similarity;
+  }
+  Pose T_place_query(const Signature& query, const Signature& place) const override {
+    return best_turn(query, place).T_place_query(query.values.cols() / static_cast<Eigen::Index>(kLeft_m.size()));
+  }
+
+ private:
+  static Turn best_turn(const Signature& query, const Signature& place) {
     const Eigen::Index sectors = query.values.cols() / static_cast<Eigen::Index>(kLeft_m.size());
     const Eigen::MatrixXf own = place.values.leftCols(sectors);
     const Eigen::VectorXf own_key = own.colwise().mean(), own_scale = inverse_lengths(own);
-    double best = 0.0;
+    Turn best;
     for (Eigen::Index copy = 0; copy < static_cast<Eigen::Index>(kLeft_m.size()); ++copy) {
       const Eigen::MatrixXf image = query.values.middleCols(copy * sectors, sectors);
       const Eigen::VectorXf scale = inverse_lengths(image);
       const Eigen::Index middle = shift_of(image.colwise().mean(), own_key);
-      for (Eigen::Index offset = -kReach; offset <= kReach; ++offset)
-        best = std::max(best, mean_cosine(image, scale, own, own_scale, (middle + offset + sectors) % sectors));
+      for (Eigen::Index offset = -kReach; offset <= kReach; ++offset) {
+        const Eigen::Index shift = (middle + offset + sectors) % sectors;
+        const double cosine = mean_cosine(image, scale, own, own_scale, shift);
+        if (cosine > best.similarity) best = {cosine, shift};
+      }
     }
     return best;
   }

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <revisit/descriptors/baseline.hpp>
+#include <revisit/descriptors/internal/surface_voxels.hpp>
+
+namespace revisit::descriptors_internal {
+
+/// A corner that others are sure to find again.
+struct TriangleKeypoint {
+  Eigen::Vector3f position;
+  Eigen::Vector3f normal;  ///< of the surface it was seen against
+  std::uint64_t code = 0;  ///< what stands there; 0: nothing is known of it
+};
+
+struct TriangleOptions {
+  std::size_t neighbours;  ///< of a keypoint, that it makes triangles with
+  float longest_m;         ///< side
+};
+
+/// What is common to the methods that know a place by triangles of keypoints, which do not change however the sensor
+/// stands: triangles of sides that agree within a hundredth (and whose corners have like normals or codes) vote for
+/// places; of the 50 with the most votes each triangle gives a pose; the pose that brings most triangles together
+/// counts, by the share of the query's upright flat pieces that lie on such pieces of the place then.
+/// Signature: `values`: a triangle a column, three sides, shortest first, and the keypoints opposite of them, in the
+/// order of the longest side; `more`: position and normal of the keypoints, then of flat pieces; `bits`: the codes.
+Baseline::Signature triangle_signature(const std::vector<TriangleKeypoint>& keypoints,
+                                       std::span<const SurfaceVoxel> voxels, const TriangleOptions& options);
+
+struct TriangleMatch {
+  double similarity = 0.0;
+  Pose T_place_query = Pose::Identity();
+};
+TriangleMatch match_triangles(const Baseline::Signature& query, const Baseline::Signature& place);
+
+std::unique_ptr<BaselineIndex> make_triangle_index();
+
+}  // namespace revisit::descriptors_internal
