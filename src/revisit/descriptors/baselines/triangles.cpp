@@ -37,17 +37,20 @@ std::vector<std::size_t> nearest_of(const std::vector<TriangleKeypoint>& keypoin
   return others;
 }
 
-Eigen::Vector<float, 6> triangle_of(const std::vector<TriangleKeypoint>& keypoints,
+Eigen::Vector<float, 9> triangle_of(const std::vector<TriangleKeypoint>& keypoints,
                                     const std::array<std::size_t, 3>& corners) {
   std::array<std::pair<float, std::size_t>, 3> sides;  // and what lies opposite
   for (std::size_t i = 0; i < 3; ++i)
     sides[i] = {(keypoints[corners[(i + 1) % 3]].position - keypoints[corners[(i + 2) % 3]].position).norm(),
                 corners[i]};
   std::sort(sides.begin(), sides.end());
-  Eigen::Vector<float, 6> triangle;
+  Eigen::Vector<float, 9> triangle;
   for (std::size_t i = 0; i < 3; ++i) {
     triangle[static_cast<Eigen::Index>(i)] = sides[i].first;
+
     triangle[static_cast<Eigen::Index>(i + 3)] = static_cast<float>(sides[i].second);
+    triangle[static_cast<Eigen::Index>(i + 6)] =
+        keypoints[sides[i].second].normal.dot(keypoints[sides[(i + 1) % 3].second].normal);
   }
   return triangle;
 }
@@ -65,19 +68,18 @@ float alike(std::uint64_t a, std::uint64_t b) {
 }
 
 // Angles between the normals do not change with the pose; neither do the codes.
-bool corners_agree(const Signature& query, Eigen::Index q, const Signature& place, Eigen::Index p) {
+bool normals_agree(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
+  return (a - b).cwiseAbs().maxCoeff() <= kSameNormals;
+}
+bool codes_agree(const Signature& query, Eigen::Index q, const Signature& place, Eigen::Index p) {
   float codes = 0.f;
   for (Eigen::Index corner = 0; corner < 3; ++corner)
     codes += alike(query.bits[static_cast<std::size_t>(keypoint_of(query, q, corner))],
                    place.bits[static_cast<std::size_t>(keypoint_of(place, p, corner))]);
-  if (codes < 3.f * kSameCodes) return false;
-  const auto cosine = [](const Signature& s, Eigen::Index triangle, Eigen::Index corner) {
-    return s.more.block<3, 1>(3, keypoint_of(s, triangle, corner))
-        .dot(s.more.block<3, 1>(3, keypoint_of(s, triangle, (corner + 1) % 3)));
-  };
-  for (Eigen::Index corner = 0; corner < 3; ++corner)
-    if (std::abs(cosine(query, q, corner) - cosine(place, p, corner)) > kSameNormals) return false;
-  return true;
+  return codes >= 3.f * kSameCodes;
+}
+Eigen::Vector3f cosines_of(const Signature& signature, Eigen::Index triangle) {
+  return signature.values.block<3, 1>(6, triangle);
 }
 
 float tolerance_m(const Eigen::Vector3f& sides) { return kSame * sides.norm(); }
@@ -93,7 +95,8 @@ Pairs agreeing_triangles(const Signature& query, const Signature& place) {
     // Both in the order of the longest side, with which the tolerance grows by less.
     while (first < place.values.cols() && place.values(2, first) < sides[2] * (1.f - kSame * std::sqrt(3.f))) ++first;
     for (Eigen::Index p = first; p < place.values.cols() && place.values(2, p) <= sides[2] + most_m; ++p)
-      if ((place.values.block<3, 1>(0, p) - sides).norm() < most_m && corners_agree(query, q, place, p))
+      if ((place.values.block<3, 1>(0, p) - sides).squaredNorm() < most_m * most_m &&
+          normals_agree(cosines_of(query, q), cosines_of(place, p)) && codes_agree(query, q, place, p))
         pairs.emplace_back(q, p);
   }
   return pairs;
@@ -159,8 +162,8 @@ class TriangleIndex final : public BaselineIndex {
   void add(const Signature& place) override {
     for (Eigen::Index i = 0; i < place.values.cols(); ++i) {
       const Eigen::Vector3f sides = place.values.block<3, 1>(0, i);
-      cells_[cell_of(sides)].push_back(
-          {sides, static_cast<std::uint32_t>(places_.size()), static_cast<std::uint32_t>(i)});
+      cells_[key_of((sides.array() / kCell_m).floor())].push_back(
+          {sides, cosines_of(place, i), static_cast<std::uint32_t>(places_.size()), static_cast<std::uint32_t>(i)});
     }
     entries_ += static_cast<std::size_t>(place.values.cols());
     places_.push_back(&place);
@@ -170,10 +173,14 @@ class TriangleIndex final : public BaselineIndex {
     std::vector<std::uint32_t> votes(searchable);
     for (Eigen::Index i = 0; i < query.values.cols(); ++i) {
       const Eigen::Vector3f sides = query.values.block<3, 1>(0, i);
-      for (int a = -1; a <= 1; ++a)
-        for (int b = -1; b <= 1; ++b)
-          for (int c = -1; c <= 1; ++c)
-            vote(query, i, sides, cell_of(sides + Eigen::Vector3i(a, b, c).cast<float>() * kCell_m), votes);
+      // Of the cells beside its own, those that the tolerance reaches.
+      const float reach_m = std::min(tolerance_m(sides), kCell_m);
+      const Eigen::Array3f lowest = ((sides.array() - reach_m).max(0.f) / kCell_m).floor();
+      const Eigen::Array3f highest = ((sides.array() + reach_m) / kCell_m).floor();
+      Eigen::Array3f cell;
+      for (cell[0] = lowest[0]; cell[0] <= highest[0]; ++cell[0])
+        for (cell[1] = lowest[1]; cell[1] <= highest[1]; ++cell[1])
+          for (cell[2] = lowest[2]; cell[2] <= highest[2]; ++cell[2]) vote(query, i, sides, key_of(cell), votes);
     }
     std::vector<std::size_t> places;
     for (std::size_t i = 0; i < searchable; ++i)
@@ -191,24 +198,25 @@ class TriangleIndex final : public BaselineIndex {
   static constexpr float kCell_m = 0.2f;
   static constexpr std::size_t kCandidates = 50;
   struct Entry {
-    Eigen::Vector3f sides;
+    Eigen::Vector3f sides, cosines;
     std::uint32_t place, triangle;
   };
 
-  static std::uint64_t cell_of(const Eigen::Vector3f& sides) {
-    const auto axis = [&](Eigen::Index i) { return static_cast<std::uint64_t>(std::max(0.f, sides[i] / kCell_m)); };
-    return axis(0) << 40 | axis(1) << 20 | axis(2);
+  static std::uint64_t key_of(const Eigen::Array3f& cell) {
+    return static_cast<std::uint64_t>(cell[0]) << 40 | static_cast<std::uint64_t>(cell[1]) << 20 |
+           static_cast<std::uint64_t>(cell[2]);
   }
 
   void vote(const Signature& query, Eigen::Index triangle, const Eigen::Vector3f& sides, std::uint64_t cell,
             std::vector<std::uint32_t>& votes) const {
     const auto found = cells_.find(cell);
     if (found == cells_.end()) return;
+    const Eigen::Vector3f cosines = cosines_of(query, triangle);
     const float most_m2 = tolerance_m(sides) * tolerance_m(sides);
     for (const Entry& entry : found->second) {
       if (entry.place >= votes.size()) break;  // they come in order
-      if ((entry.sides - sides).squaredNorm() < most_m2 &&
-          corners_agree(query, triangle, *places_[entry.place], static_cast<Eigen::Index>(entry.triangle)))
+      if ((entry.sides - sides).squaredNorm() < most_m2 && normals_agree(entry.cosines, cosines) &&
+          codes_agree(query, triangle, *places_[entry.place], static_cast<Eigen::Index>(entry.triangle)))
         ++votes[entry.place];
     }
   }
@@ -232,14 +240,14 @@ Signature triangle_signature(const std::vector<TriangleKeypoint>& keypoints, std
         corners.insert(triangle);
       }
   }
-  std::vector<Eigen::Vector<float, 6>> triangles;
+  std::vector<Eigen::Vector<float, 9>> triangles;
   for (const auto& each : corners)
     if (const auto triangle = triangle_of(keypoints, each);
         triangle[0] > kShortest_m && triangle[2] < options.longest_m)
       triangles.push_back(triangle);
   std::stable_sort(triangles.begin(), triangles.end(), [](const auto& a, const auto& b) { return a[2] < b[2]; });
   Signature signature;
-  signature.values.resize(6, static_cast<Eigen::Index>(triangles.size()));
+  signature.values.resize(9, static_cast<Eigen::Index>(triangles.size()));
   for (std::size_t i = 0; i < triangles.size(); ++i) signature.values.col(static_cast<Eigen::Index>(i)) = triangles[i];
   // The ground agrees everywhere.
   const auto counts = [](const SurfaceVoxel& voxel) {

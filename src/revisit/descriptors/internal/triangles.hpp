@@ -29,8 +29,9 @@ struct TriangleOptions {
 /// stands: triangles of sides that agree within a hundredth (and whose corners have like normals or codes) vote for
 /// places; of the 50 with the most votes each triangle gives a pose; the pose that brings most triangles together
 /// counts, by the share of the query's upright flat pieces that lie on such pieces of the place then.
-/// Signature: `values`: a triangle a column, three sides, shortest first, and the keypoints opposite of them, in the
-/// order of the longest side; `more`: position and normal of the keypoints, then of flat pieces; `bits`: the codes.
+/// Signature: `values`: a triangle a column, three sides, shortest first, the keypoints opposite of them, and the
+/// cosines between the normals of these, in the order of the longest side; `more`: position and normal of the
+/// keypoints, then of flat pieces; `bits`: the codes.
 Baseline::Signature triangle_signature(const std::vector<TriangleKeypoint>& keypoints,
                                        std::span<const SurfaceVoxel> voxels, const TriangleOptions& options);
 
