@@ -1,7 +1,7 @@
 # Every outside library, found once, and only those that `revisit_dependencies` names. Debian 12 package names:
 # scripts/packages.txt. Installed beside revisitConfig.cmake, so that consumers find the same things.
 if(NOT DEFINED revisit_dependencies)
-  set(revisit_dependencies Eigen TBB Highway PCL Ceres SQLite Bags Embree Geographic)
+  set(revisit_dependencies Eigen TBB Highway PCL Ceres SQLite Bags Embree Geographic OpenCV)
 endif()
 if(Eigen IN_LIST revisit_dependencies)
   find_package(Eigen3 3.4 REQUIRED NO_MODULE)
@@ -45,4 +45,15 @@ if(PCL IN_LIST revisit_dependencies AND NOT TARGET revisit_pcl)
     target_link_libraries(revisit_pcl INTERFACE ${REVISIT_PCL_${component}_LIBRARY})
   endforeach()
   target_link_libraries(revisit_pcl INTERFACE Eigen3::Eigen)
+endif()
+
+# Of OpenCV what finds features in images, and what it stands on.
+if(OpenCV IN_LIST revisit_dependencies AND NOT TARGET revisit_opencv)
+  find_path(REVISIT_OPENCV_INCLUDE_DIR opencv2/features2d.hpp PATH_SUFFIXES opencv4 REQUIRED)
+  add_library(revisit_opencv INTERFACE IMPORTED)
+  target_include_directories(revisit_opencv SYSTEM INTERFACE ${REVISIT_OPENCV_INCLUDE_DIR})
+  foreach(component features2d core)
+    find_library(REVISIT_OPENCV_${component}_LIBRARY opencv_${component} REQUIRED)
+    target_link_libraries(revisit_opencv INTERFACE ${REVISIT_OPENCV_${component}_LIBRARY})
+  endforeach()
 endif()

@@ -25,7 +25,7 @@ folders of scans).")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME librevisit-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libbz2-dev, libceres-dev, libeigen3-dev, libembree-dev, libgeographiclib-dev, \
-libhwy-dev, liblz4-dev, libpcap-dev, libpcl-dev, libsqlite3-dev, libtbb-dev, libzstd-dev, pkg-config, zlib1g-dev")
+libhwy-dev, liblz4-dev, libopencv-features2d-dev, libpcap-dev, libpcl-dev, libsqlite3-dev, libtbb-dev, libzstd-dev, pkg-config, zlib1g-dev")
 set(CPACK_DEBIAN_DEV_DESCRIPTION "C++ library: headers, static libraries and the CMake package
 (find_package(revisit)).")
 

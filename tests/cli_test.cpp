@@ -138,7 +138,7 @@ TEST(Cli, CompareRunsEachMethodOverTheSameScans) {
   ASSERT_EQ(all.code, 0) << all.output;
   for (const char* method : {"revisit", "revisit-retrieval", "isc-paper", "isc-program", "scan-context-ring-key",
                              "scan-context", "scan-context++", "m2dp", "glarot3d", "lidar-iris", "nbld", "ring",
-                             "ring++", "contour-context", "std", "btc", "solid"}) {
+                             "ring++", "contour-context", "std", "btc", "solid", "mapclosures"}) {
     EXPECT_NE(all.output.find(method), std::string::npos) << all.output;
     EXPECT_TRUE(fs::exists(out / method / "candidates.csv")) << method;
   }
@@ -178,10 +178,29 @@ TEST(Cli, CompareRunsEachMethodOverTheSameScans) {
   EXPECT_EQ(again.code, 1) << again.output;  // results are there already
   const Outcome unknown = run("compare " + drive.string() + " --methods nothing --out " + (folder / "x").string());
   EXPECT_EQ(unknown.code, 2) << unknown.output;
+  const Outcome blind = run("compare " + drive.string() + " --methods visual-words --out " + (folder / "v").string());
+  EXPECT_EQ(blind.code, 1);
+  EXPECT_NE(blind.output.find("simulated drives"), std::string::npos) << blind.output;
   fs::remove(drive / "poses.txt");
   const Outcome without = run("compare " + drive.string() + " --out " + (folder / "y").string());
   EXPECT_EQ(without.code, 1);
   EXPECT_NE(without.output.find("--poses"), std::string::npos) << without.output;
+}
+
+TEST(Cli, CompareLooksThroughTheCameraOfASimulatedDrive) {
+  const fs::path folder = fresh_folder(), spec = folder / "drive.toml", out = folder / "compared";
+  std::ofstream(spec) << "[simulation]\nsensor = \"vlp16\"\nlength_m = 60\nframes = 12\n";
+  const Outcome compared =
+      run("compare " + spec.string() + " --retrieval.exclude_frames 3 --retrieval.exclude_s 0.3 --methods " +
+          "visual-words,visual-words-day-night --out " + out.string());
+  ASSERT_EQ(compared.code, 0) << compared.output;
+  const auto by_day = read_candidates(out / "visual-words" / "candidates.csv"),
+             at_dusk = read_candidates(out / "visual-words-day-night" / "candidates.csv");
+  ASSERT_TRUE(by_day && at_dusk);
+  ASSERT_EQ(by_day->size(), 9u);
+  for (const CandidateRow& row : *by_day) EXPECT_LE(row.match->value, row.query.value - 3);
+  EXPECT_DOUBLE_EQ(by_day->front().score, at_dusk->front().score) << "both by day";
+  EXPECT_GT(by_day->back().score, at_dusk->back().score) << "night against day";
 }
 
 // A map of `revisit slam` answers without its scans; the same folder is no recording.

@@ -2,12 +2,14 @@
 #include "methods.hpp"
 
 #include <algorithm>
+#include <array>
 #include <ctime>
 #include <utility>
 
 #include <oneapi/tbb/parallel_for.h>
 
 #include <revisit/core/refusal_text.hpp>
+#include <revisit/vision/density_map.hpp>
 
 namespace revisit::cli {
 namespace {
@@ -20,6 +22,31 @@ double worked_ms() {
   std::timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
+}
+
+struct VisionRow {
+  const char *name, *light;
+  bool by_night_first, by_night_then;
+};
+constexpr std::array kVision{VisionRow{"visual-words", "by day", false, false},
+                             VisionRow{"visual-words-night", "by night", true, true},
+                             VisionRow{"visual-words-day-night", "first by day, then by night", false, true}};
+
+// Images of another drive through another world of this kind, by day and by night.
+std::shared_ptr<const Vocabulary> vocabulary_beside(const SimulatedRecording& recording) {
+  constexpr std::size_t kMostImages = 200, kStep = 4;  // of scans that follow each other most is the same
+  SimulationOptions options = recording.options();
+  options.seed += 1000;
+  options.trajectory.clear();
+  options.frames = 0;
+  std::vector<Image> images;
+  if (const auto other = simulate(options)) {
+    const std::size_t wanted = std::min(kMostImages, (*other)->size() / kStep);
+    for (std::size_t i = 0; i < wanted; ++i)
+      images.push_back(
+          (*other)->image(i * (*other)->size() / wanted, i % 2 == 0 ? ImageLight::kDay : ImageLight::kNight));
+  }
+  return make_vocabulary(images);
 }
 
 std::size_t bytes_of(const IntensityScanContext& descriptor) {
@@ -35,9 +62,21 @@ double time_ms(Work work) {
 
 }  // namespace
 
+std::vector<std::unique_ptr<Baseline>> all_baselines() {
+  auto all = make_baselines();
+  all.push_back(make_density_map());
+  return all;
+}
+
 std::vector<std::string> Methods::names() {
   std::vector<std::string> names{kOurs, kOurRetrieval, kPaper};
-  for (const auto& baseline : make_baselines()) names.push_back(baseline->name());
+  for (const auto& baseline : all_baselines()) names.push_back(baseline->name());
+  return names;
+}
+
+std::vector<std::string> Methods::vision_names() {
+  std::vector<std::string> names;
+  for (const VisionRow& row : kVision) names.emplace_back(row.name);
   return names;
 }
 
@@ -66,7 +105,7 @@ Methods::Methods(const Options& options, const Parameters& parameters, const Int
         std::make_unique<LoopDetector>(as_printed, scale);
   }
   std::size_t most_scans = 0;  // 0: nobody wants more than one
-  for (auto& baseline : make_baselines()) {
+  for (auto& baseline : all_baselines()) {
     if (!is_wanted(baseline->name())) continue;
     Method& method = add(baseline->name(), baseline->source());
     method.report.gives = baseline->gives();
@@ -80,13 +119,39 @@ Methods::Methods(const Options& options, const Parameters& parameters, const Int
     });
   }
   recent_ = RecentScans(most_scans);
+  camera_ = options.camera;
+  if (camera_ != nullptr) add_vision(options.wanted, parameters.retrieval);
   for (auto& method : all_) {
     method->report.is_verified = method->places_ || method->detector_;
     if (!method->baseline_ && method->report.is_verified) method->report.gives = Baseline::Gives::kPose;
   }
 }
 
-Status Methods::answer(const Scan& scan) {
+void Methods::add_vision(const std::vector<std::string>& wanted, const ExclusionRule& exclusion) {
+  std::shared_ptr<const Vocabulary> vocabulary;
+  for (const VisionRow& row : kVision) {
+    if (std::find(wanted.begin(), wanted.end(), row.name) == wanted.end()) continue;
+    if (!vocabulary) vocabulary = vocabulary_beside(*camera_);
+    Method& method =
+        add(row.name, std::string("Galvez-Lopez and Tardos, T-RO 2012 (DBoW2), of images of a camera, ") + row.light);
+    method.words_ = std::make_unique<VisualWords>(vocabulary, exclusion);
+    looks_.push_back({&method, row.by_night_first, row.by_night_then});
+  }
+}
+
+Status Methods::look(const FrameTime& frame, std::size_t index) {
+  const bool is_second_half = 2 * index >= camera_->size();
+  for (const Look& look : looks_) {
+    const bool by_night = is_second_half ? look.by_night_then : look.by_night_first;
+    const Image image = camera_->image(index, by_night ? ImageLight::kNight : ImageLight::kDay);
+    if (const Status status = look.method->answer(frame, image); !status) return status;
+  }
+  return ok();
+}
+
+Status Methods::answer(const Scan& scan, std::size_t index) {
+  if (!looks_.empty())
+    if (const Status status = look({scan.frame, scan.stamp_s}, index); !status) return status;
   const auto step = front_end_.step(scan);
   if (step) recent_.add(step->scan);
   const TypicalAgreement typical = front_end_.typical().recent();
@@ -105,6 +170,13 @@ Status Method::open(const std::filesystem::path& folder, ResultWriter::Existing 
   return ok();
 }
 
+Status Method::answer(const FrameTime& frame, const Image& image) {
+  std::optional<CandidateRow> row;
+  report.retrieval_ms += time_ms([&] { row = words_->process(frame, image); });
+  report.bytes_a_place = words_->bytes_a_place();
+  return row ? writer_->add(*row) : ok();
+}
+
 Status Method::answer(const Scan& raw, const PreparedScan* prepared, const RecentScans& recent,
                       const TypicalAgreement& typical) {
   Status status = ok();
@@ -117,7 +189,7 @@ Status Method::answer(const Scan& raw, const PreparedScan* prepared, const Recen
       status = write(*detection, detection->row());
       return;
     }
-    if (!prepared) return;
+    if (!prepared || words_) return;
     if (index_) status = search(*prepared);
     if (baseline_) status = retrieve(*prepared, recent);
     if (status && places_) status = recognise(*prepared, typical);

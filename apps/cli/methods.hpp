@@ -16,6 +16,8 @@
 #include <revisit/pipeline/place_recognition.hpp>
 #include <revisit/pipeline/recent_scans.hpp>
 #include <revisit/retrieval/baseline_search.hpp>
+#include <revisit/simulation/simulated_recording.hpp>
+#include <revisit/vision/visual_words.hpp>
 
 #include "reports/comparison.hpp"
 
@@ -28,6 +30,8 @@ class Method {
   MethodReport report;  ///< what it cost is added up meanwhile
   std::vector<GivenPose> given_poses;
 
+  /// Of a method that looks at images.
+  Status answer(const FrameTime& frame, const Image& image);
   /// `raw` as the recording has it; `prepared`: null where the scan describes no place; `recent`: up to it.
   Status answer(const Scan& raw, const PreparedScan* prepared, const RecentScans& recent,
                 const TypicalAgreement& typical);
@@ -42,15 +46,19 @@ class Method {
   Status write(const Detection& detection, const std::optional<CandidateRow>& row);
 
   // What it is made of: a baseline, and this program's places to verify its answers; either alone; this program's index
-  // alone; or a whole detector.
+  // alone; a whole detector; or words of images.
   std::unique_ptr<BaselineSearch> baseline_;
   std::unique_ptr<PlaceRecognition> places_;
   std::unique_ptr<PlaceIndex> index_;
   std::unique_ptr<LoopDetector> detector_;
+  std::unique_ptr<VisualWords> words_;
   std::optional<CandidateRow> row_;  ///< of the baseline
   std::optional<ResultWriter> writer_;
   std::unique_ptr<tbb::task_arena> one_thread_ = std::make_unique<tbb::task_arena>(1);
 };
+
+/// The published methods: make_baselines(), and those that need OpenCV.
+std::vector<std::unique_ptr<Baseline>> all_baselines();
 
 /// Those that are wanted, and what comes before all of them.
 class Methods {
@@ -58,19 +66,30 @@ class Methods {
   struct Options {
     std::vector<std::string> wanted;  ///< empty: all
     bool verifies_all = false;        ///< what baselines answer is registered as this program does
+    /// Whose camera the methods of vision_names() look through, which must outlive this; null: without them.
+    const SimulatedRecording* camera = nullptr;
   };
   static std::vector<std::string> names();
+  static std::vector<std::string> vision_names();  ///< only where they are wanted by name
   Methods(const Options& options, const Parameters& parameters, const IntensityScale& scale);
 
-  /// Gives the scan to each, several at once.
-  Status answer(const Scan& scan);
+  /// Gives the scan, number `index` of the recording, to each, several at once.
+  Status answer(const Scan& scan, std::size_t index);
   std::vector<std::unique_ptr<Method>>& all() { return all_; }
 
  private:
   Method& add(const std::string& name, const std::string& source);
+  void add_vision(const std::vector<std::string>& wanted, const ExclusionRule& exclusion);
+  Status look(const FrameTime& frame, std::size_t index);
 
   DetectionFrontEnd front_end_;
   RecentScans recent_{0};
+  const SimulatedRecording* camera_ = nullptr;
+  struct Look {
+    Method* method;
+    bool by_night_first, by_night_then;  ///< in the first half of the drive, and in the second
+  };
+  std::vector<Look> looks_;
   std::vector<std::unique_ptr<Method>> all_;
 };
 

@@ -41,7 +41,7 @@ Result<std::size_t> run_all(Methods& methods, const Recording& recording) {
       ++skipped;
       continue;
     }
-    if (const Status status = methods.answer(*scan); !status) return status.error();
+    if (const Status status = methods.answer(*scan, i); !status) return status.error();
   }
   return skipped;
 }
@@ -105,7 +105,11 @@ int compare(const CompareOptions& options) {
   if (!scale) return fail({scale.error().message + "; no scan can be used"});
   for (const std::string& each : options.candidates)  // not after hours
     if (const auto rows = read_candidates(each.substr(each.find('=') + 1)); !rows) return fail(rows.error());
-  Methods methods({options.methods, options.verify}, *parameters, *scale);
+  const auto* const camera = dynamic_cast<const SimulatedRecording*>(recording->get());
+  for (const std::string& vision : Methods::vision_names())
+    if (camera == nullptr && std::find(options.methods.begin(), options.methods.end(), vision) != options.methods.end())
+      return fail({options.input + ": has no images for " + vision + "; simulated drives (.toml) have"});
+  Methods methods({options.methods, options.verify, camera}, *parameters, *scale);
   for (const auto& method : methods.all())
     if (const Status status =
             method->open(fs::path(options.out) / method->report.name,
@@ -150,15 +154,22 @@ Run add_compare(CLI::App& program) {
       "  revisit                this program, with the parameters given; its scores are those after verification\n"
       "  revisit-retrieval      its index alone: the first answer, unverified\n"
       "  isc-paper              Intensity Scan Context as in the paper\n";
-  for (const auto& baseline : make_baselines())
+  for (const auto& baseline : all_baselines())
     footer += "  " + baseline->name() + std::string(23 - std::min<std::size_t>(22, baseline->name().size()), ' ') +
               baseline->source() + "\n";
+  footer +=
+      "By name only, on simulated drives, which have a camera (DBoW2; images take a while to compute):\n"
+      "  visual-words, visual-words-night, visual-words-day-night\n";
   command->footer(footer + "\nExample: revisit compare kitti/sequences/00 --poses kitti/poses/00.txt --out compared");
   command->add_option("input", options->input, "Recording with poses, or .toml of a simulated drive")->required();
   command->add_option("--out", options->out, "Folder for the results")->required();
   command->add_option("--methods", options->methods, "Only these (separated by commas); default: all")
       ->delimiter(',')
-      ->check(CLI::IsMember(Methods::names()));
+      ->check(CLI::IsMember([] {
+        auto names = Methods::names();
+        for (const std::string& vision : Methods::vision_names()) names.push_back(vision);
+        return names;
+      }()));
   command->add_flag("--verify", options->verify,
                     "Register what each method answers as this program does, and judge it by table 2");
   command

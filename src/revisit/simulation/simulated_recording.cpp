@@ -2,8 +2,10 @@
 #include <revisit/simulation/simulated_recording.hpp>
 
 #include <algorithm>
+#include <mutex>
 #include <stdexcept>
 
+#include <revisit/simulation/internal/camera.hpp>
 #include <revisit/simulation/internal/gps_model.hpp>
 #include <revisit/simulation/internal/imu_model.hpp>
 #include <revisit/simulation/internal/odometry_model.hpp>
@@ -22,6 +24,8 @@ struct SimulatedRecording::Parts {
   std::size_t size;
   std::unique_ptr<Scanner> scanner;
   Trajectory truth, wheels, drifting;
+  std::once_flag has_camera = {};
+  std::unique_ptr<simulation_internal::Camera> camera = {};  ///< made for the first image
 };
 
 SimulatedRecording::SimulatedRecording(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
@@ -64,6 +68,16 @@ std::vector<ImuSample> SimulatedRecording::imu(double stamp_s, double from_s, do
   return simulation_internal::imu_samples(*parts_->scanner, parts_->world.seed_of_day(), stamp_s, from_s, to_s);
 }
 
+Image SimulatedRecording::image(std::size_t index, ImageLight light) const {
+  std::call_once(parts_->has_camera,
+                 [this] { parts_->camera = std::make_unique<simulation_internal::Camera>(parts_->world); });
+  Pose T_local_lidar = parts_->scanner->T_world_lidar(stamp_s(index));
+  T_local_lidar.translation() -= parts_->world.origin;
+  return parts_->camera->picture(
+      T_local_lidar, stamp_s(index), light,
+      simulation_internal::mix(parts_->world.seed_of_day(), 81, static_cast<std::uint64_t>(index)));
+}
+
 Result<std::unique_ptr<SimulatedRecording>> simulate(const SimulationOptions& options, const LogSink& log,
                                                      int threads) {
   const auto sensor = find_sensor_model(options.sensor);
@@ -75,8 +89,8 @@ Result<std::unique_ptr<SimulatedRecording>> simulate(const SimulationOptions& op
                                               : simulation_internal::build_building(options);
   if (!world) return world.error();
 
-  auto parts = std::make_unique<SimulatedRecording::Parts>(
-      SimulatedRecording::Parts{options, *sensor, *std::move(world), 0, nullptr, {}, {}, {}});
+  auto parts = std::unique_ptr<SimulatedRecording::Parts>(
+      new SimulatedRecording::Parts{options, *sensor, *std::move(world), 0, nullptr, {}, {}, {}});
   parts->size = parts->world.path.knots().size();
   if (options.frames > 0) parts->size = std::min(parts->size, static_cast<std::size_t>(options.frames));
   parts->scanner = std::make_unique<Scanner>(

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 
 #include <revisit/config/parameters.hpp>
+#include <revisit/core/image.hpp>
 #include <revisit/io/recording.hpp>
 #include <revisit/simulation/sensor_model.hpp>
 
 namespace revisit {
+
+enum class ImageLight : std::uint8_t { kDay, kNight };
 
 /// A recording that exists nowhere: each scan is computed when it is read. World: x, y level, z up, metres; stamps
 /// count from the start of the drive, and a scan's stamp is the middle of its sweep, where the sensor looks straight
@@ -38,6 +42,9 @@ class SimulatedRecording final : public Recording {
   Result<std::vector<GpsFix>> gps_fixes(const std::string& topic) const override;
   /// What an IMU in the sensor reads in this part of the drive; times from `stamp_s`.
   std::vector<ImuSample> imu(double stamp_s, double from_s, double to_s) const;
+  /// What a camera in the LiDAR, which looks ahead, sees at the stamp of scan `index`: 640 x 240 pixels, 90 degrees
+  /// wide, in the light of the day or by the vehicle's own lamp.
+  Image image(std::size_t index, ImageLight light = ImageLight::kDay) const;
   /// Six degrees of freedom, drifting away slowly.
   const Trajectory& drifting_odometry() const;
 

@@ -19,6 +19,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
+#include <revisit/core/planar_fit.hpp>
 #include <revisit/descriptors/internal/baselines.hpp>
 #include <revisit/descriptors/internal/contours.hpp>
 #include <revisit/descriptors/internal/planar_mixture.hpp>

@@ -67,16 +67,6 @@ Overlap overlap_of(const Eigen::MatrixXf& source, const Eigen::MatrixXf& target,
 
 }  // namespace
 
-Pose planar_fit(const Eigen::Matrix2Xf& from, const Eigen::Matrix2Xf& to) {
-  if (from.cols() == 0) return Pose::Identity();
-  const Eigen::Vector2f mean_from = from.rowwise().mean(), mean_to = to.rowwise().mean();
-  const Eigen::Matrix2f cross = (to.colwise() - mean_to) * (from.colwise() - mean_from).transpose();
-  const auto yaw_rad = static_cast<double>(std::atan2(cross(1, 0) - cross(0, 1), cross(0, 0) + cross(1, 1)));
-  Pose T = planar_pose(0.0, 0.0, yaw_rad);
-  T.translation().head<2>() = mean_to.cast<double>() - T.linear().topLeftCorner<2, 2>() * mean_from.cast<double>();
-  return T;
-}
-
 MixtureAlignment align_mixtures(const Eigen::MatrixXf& source, const Eigen::MatrixXf& target, Pose T_target_source) {
   const double own =
       std::sqrt(overlap_of(source, source, Pose::Identity()).sum * overlap_of(target, target, Pose::Identity()).sum);

@@ -7,9 +7,6 @@
 
 namespace revisit::descriptors_internal {
 
-/// The planar pose that brings the columns of `from` onto those of `to` (least squares).
-Pose planar_fit(const Eigen::Matrix2Xf& from, const Eigen::Matrix2Xf& to);
-
 /// Two mixtures of Gaussians in the plane on each other.
 struct MixtureAlignment {
   Pose T_target_source = Pose::Identity();
