@@ -135,6 +135,10 @@ TEST(Cli, CompareRunsEachMethodOverTheSameScans) {
   const fs::path folder = fresh_folder(), drive = there_and_back(folder / "drive"), out = folder / "compared";
   const std::string exclusion = " --retrieval.exclude_frames 3 --retrieval.exclude_s 3";
   const Outcome all = run("compare " + drive.string() + exclusion + " --out " + out.string());
+  const Outcome pairs = run("compare " + drive.string() + exclusion + " --methods scan-context --pairs --out " +
+                            (folder / "pairs").string());
+  EXPECT_EQ(pairs.code, 1) << pairs.output;  // too short a drive for pairs 50 frames apart
+  EXPECT_NE(pairs.output.find("no two of its frames"), std::string::npos) << pairs.output;
   ASSERT_EQ(all.code, 0) << all.output;
   for (const char* method : {"revisit", "revisit-retrieval", "isc-paper", "isc-program", "scan-context-ring-key",
                              "scan-context", "scan-context++", "m2dp", "glarot3d", "lidar-iris", "nbld", "ring",

@@ -9,6 +9,7 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <revisit/core/refusal_text.hpp>
+#include <revisit/descriptors/similarity.hpp>
 #include <revisit/vision/density_map.hpp>
 
 namespace revisit::cli {
@@ -123,6 +124,7 @@ Methods::Methods(const Options& options, const Parameters& parameters, const Int
   if (camera_ != nullptr) add_vision(options.wanted, parameters.retrieval);
   for (auto& method : all_) {
     method->report.is_verified = method->places_ || method->detector_;
+    method->wanted_pairs = options.pairs;
     if (!method->baseline_ && method->report.is_verified) method->report.gives = Baseline::Gives::kPose;
   }
 }
@@ -192,6 +194,9 @@ Status Method::answer(const Scan& raw, const PreparedScan* prepared, const Recen
     if (!prepared || words_) return;
     if (index_) status = search(*prepared);
     if (baseline_) status = retrieve(*prepared, recent);
+    if (wanted_pairs != nullptr && (index_ || baseline_) && wanted_pairs->contains(prepared->scan.frame))
+      for (const Pair& pair : wanted_pairs->at(prepared->scan.frame))
+        pairs.push_back({similarity_to(pair.match, *prepared), pair.is_same_place});
     if (status && places_) status = recognise(*prepared, typical);
   });
   return status;
@@ -213,7 +218,15 @@ Status Method::retrieve(const PreparedScan& scan, const RecentScans& recent) {
   return writer_->add(*row_);
 }
 
+// Of what retrieval alone knows.
+double Method::similarity_to(FrameId frame, const PreparedScan& scan) const {
+  if (baseline_) return baseline_->similarity_to(frame);
+  const auto found = descriptors_.find(frame);
+  return found == descriptors_.end() ? 0.0 : match_descriptors(scan.descriptor, found->second).score();
+}
+
 Status Method::search(const PreparedScan& scan) {
+  if (wanted_pairs != nullptr) descriptors_[scan.scan.frame] = scan.descriptor;
   const FrameTime query{scan.scan.frame, scan.scan.stamp_s};
   Result<std::vector<LoopCandidate>> found = std::vector<LoopCandidate>{};
   report.retrieval_ms +=

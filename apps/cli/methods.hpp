@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,6 +11,7 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include <revisit/evaluation/given_pose_table.hpp>
+#include <revisit/evaluation/pair_table.hpp>
 #include <revisit/io/result_files.hpp>
 #include <revisit/pipeline/detection_front_end.hpp>
 #include <revisit/pipeline/loop_detector.hpp>
@@ -29,6 +31,8 @@ class Method {
  public:
   MethodReport report;  ///< what it cost is added up meanwhile
   std::vector<GivenPose> given_poses;
+  std::vector<ScoredPair> pairs;  ///< of `wanted_pairs`
+  const PairLists* wanted_pairs = nullptr;
 
   /// Of a method that looks at images.
   Status answer(const FrameTime& frame, const Image& image);
@@ -42,6 +46,7 @@ class Method {
   friend class Methods;
   Status retrieve(const PreparedScan& scan, const RecentScans& recent);
   Status search(const PreparedScan& scan);
+  double similarity_to(FrameId frame, const PreparedScan& scan) const;
   Status recognise(const PreparedScan& scan, const TypicalAgreement& typical);
   Status write(const Detection& detection, const std::optional<CandidateRow>& row);
 
@@ -52,7 +57,8 @@ class Method {
   std::unique_ptr<PlaceIndex> index_;
   std::unique_ptr<LoopDetector> detector_;
   std::unique_ptr<VisualWords> words_;
-  std::optional<CandidateRow> row_;  ///< of the baseline
+  std::optional<CandidateRow> row_;                      ///< of the baseline
+  std::map<FrameId, IntensityScanContext> descriptors_;  ///< of this program's index, where pairs are compared
   std::optional<ResultWriter> writer_;
   std::unique_ptr<tbb::task_arena> one_thread_ = std::make_unique<tbb::task_arena>(1);
 };
@@ -68,6 +74,7 @@ class Methods {
     bool verifies_all = false;        ///< what baselines answer is registered as this program does
     /// Whose camera the methods of vision_names() look through, which must outlive this; null: without them.
     const SimulatedRecording* camera = nullptr;
+    const PairLists* pairs = nullptr;  ///< which the methods score beside their answers; must outlive this
   };
   static std::vector<std::string> names();
   static std::vector<std::string> vision_names();  ///< only where they are wanted by name

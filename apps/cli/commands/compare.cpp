@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 struct CompareOptions {
   std::string input, out, poses;
   std::vector<std::string> methods, candidates;
-  bool verify = false, overwrite = false;
+  bool verify = false, pairs = false, overwrite = false;
   InputFlags recording;
   ParameterFlags parameters;
 };
@@ -78,6 +78,7 @@ Result<std::vector<MethodReport>> evaluate_all(Methods& methods, const Recording
     report.evaluation = *std::move(evaluation);
     report.poses =
         evaluate_given_poses(method->given_poses, reference, method->report.gives == Baseline::Gives::kPlanarPose);
+    if (!method->pairs.empty()) report.pairs = evaluate_pairs(method->pairs);
     report.retrieval_ms /= scans;
     report.verification_ms /= scans;
   }
@@ -109,7 +110,9 @@ int compare(const CompareOptions& options) {
   for (const std::string& vision : Methods::vision_names())
     if (camera == nullptr && std::find(options.methods.begin(), options.methods.end(), vision) != options.methods.end())
       return fail({options.input + ": has no images for " + vision + "; simulated drives (.toml) have"});
-  Methods methods({options.methods, options.verify, camera}, *parameters, *scale);
+  const PairLists pairs = options.pairs ? make_pair_lists((*recording)->trajectory()) : PairLists{};
+  if (options.pairs && pairs.empty()) return fail({options.input + ": no two of its frames are of one place (3 m)"});
+  Methods methods({options.methods, options.verify, camera, options.pairs ? &pairs : nullptr}, *parameters, *scale);
   for (const auto& method : methods.all())
     if (const Status status =
             method->open(fs::path(options.out) / method->report.name,
@@ -126,10 +129,15 @@ int compare(const CompareOptions& options) {
   const std::vector<MethodReport>& reports = *evaluated;
   std::cout << to_text(reports);
   const fs::path out = options.out;
-  for (const Status& status :
-       {write_text(out / "comparison.txt", to_text(reports)), write_text(out / "comparison.json", to_json(reports)),
-        write_text(out / "comparison.csv", to_csv(reports)), write_text(out / "comparison.tex", to_latex(reports)),
-        draw_comparison(out / "precision_recall.png", reports)})
+  std::vector<Status> written{
+      write_text(out / "comparison.txt", to_text(reports)), write_text(out / "comparison.json", to_json(reports)),
+      write_text(out / "comparison.csv", to_csv(reports)), write_text(out / "comparison.tex", to_latex(reports)),
+      draw_comparison(out / "precision_recall.png", reports)};
+  if (options.pairs) {
+    std::cout << '\n' << pairs_to_text(reports);
+    written.push_back(write_text(out / "pairs.csv", pairs_to_csv(reports)));
+  }
+  for (const Status& status : written)
     if (!status) return fail(status.error());
   std::cout << "Picture: " << (out / "precision_recall.png").string() << '\n';
   if (interrupted()) return kInterrupted;
@@ -172,6 +180,8 @@ Run add_compare(CLI::App& program) {
       }()));
   command->add_flag("--verify", options->verify,
                     "Register what each method answers as this program does, and judge it by table 2");
+  command->add_flag("--pairs", options->pairs,
+                    "Also the protocol of pair lists (SSC): pairs.csv, with F1max and EP; takes a while");
   command
       ->add_option("--candidates", options->candidates,
                    "NAME=FILE: judge the candidates.csv of another program beside them; may be repeated")

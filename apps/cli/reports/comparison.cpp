@@ -99,6 +99,26 @@ std::string to_text(const std::vector<MethodReport>& methods) {
   return text;
 }
 
+std::string pairs_to_text(const std::vector<MethodReport>& methods) {
+  Table table = {{"", "pairs of one place", "F1max", "EP"}};
+  for (const MethodReport& method : methods)
+    if (method.pairs.revisits > 0)
+      table.push_back({method.name, std::to_string(method.pairs.revisits), format("%.3f", method.pairs.f1_max),
+                       format("%.3f", method.pairs.extended_precision)});
+  return "Pair lists (below 3 m against beyond 20 m, 1 to 100): retrieval's own scores, another protocol than above\n" +
+         to_text(table);
+}
+
+std::string pairs_to_csv(const std::vector<MethodReport>& methods) {
+  std::string text = "method,pairs_of_one_place,pairs_of_two,f1_max,extended_precision\n";
+  for (const MethodReport& method : methods)
+    if (method.pairs.revisits > 0)
+      text +=
+          format("%s,%zu,%zu,%.6f,%.6f\n", method.name.c_str(), method.pairs.revisits,
+                 method.pairs.answers - method.pairs.revisits, method.pairs.f1_max, method.pairs.extended_precision);
+  return text;
+}
+
 std::string to_csv(const std::vector<MethodReport>& methods) {
   std::string text =
       "method,revisits,recall_at_1,f1_max,average_precision,recall_at_p100,extended_precision,reverse_revisits,"

@@ -23,6 +23,7 @@ struct MethodReport {
   double verification_ms = 0.0;  ///< likewise
   std::size_t bytes_a_place = 0;
   EvaluationReport evaluation;
+  RetrievalTable pairs;  ///< by the protocol of pair lists; none: not asked for
   GivenPoseTable poses;  ///< what its right answers say of the pose
 };
 
@@ -33,6 +34,9 @@ std::string to_json(const std::vector<MethodReport>& methods);
 std::string to_csv(const std::vector<MethodReport>& methods);
 /// Both tables for a paper (package booktabs).
 std::string to_latex(const std::vector<MethodReport>& methods);
+/// The protocol of pair lists, which shares no table with the others.
+std::string pairs_to_text(const std::vector<MethodReport>& methods);
+std::string pairs_to_csv(const std::vector<MethodReport>& methods);
 /// Precision over recall of all of them.
 Status draw_comparison(const std::filesystem::path& file, const std::vector<MethodReport>& methods);
 

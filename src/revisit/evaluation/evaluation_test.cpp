@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/evaluation/given_pose_table.hpp>
 #include <revisit/evaluation/loop_table.hpp>
+#include <revisit/evaluation/pair_table.hpp>
 #include <revisit/evaluation/retrieval_table.hpp>
 
 #include <fstream>
@@ -60,6 +61,31 @@ TEST(GivenPoseTable, CountsByHand) {
   EXPECT_NEAR(table.p95_plane_m, 0.6, 1e-9);
   EXPECT_NEAR(table.p95_height_m, 0.6, 1e-9);
   EXPECT_EQ(evaluate_given_poses(poses, reference, true).right, 3u);
+}
+
+TEST(PairLists, AreOfOnePlaceOrOfTwoFarFromEachOther) {
+  const Reference reference = there_and_back();
+  const PairLists lists = make_pair_lists(reference.trajectory());
+  std::size_t same = 0, others = 0;
+  for (const auto& [query, pairs] : lists)
+    for (const Pair& pair : pairs) {
+      const double distance_m = *reference.distance_m(pair.match, query);
+      EXPECT_LT(pair.match, query);
+      if (pair.is_same_place) {
+        EXPECT_LT(distance_m, 3.0);
+        EXPECT_GT(query.value - pair.match.value, 50);
+      } else {
+        EXPECT_GT(distance_m, 20.0);
+      }
+      (pair.is_same_place ? same : others) += 1;
+    }
+  // Frame 100 + i lies 0, 1 and 2 m from five frames; of these 75, twice 74 and twice 74 are more than 50 frames before.
+  EXPECT_EQ(same, 371u);
+  EXPECT_EQ(others, 100 * same);
+  const RetrievalTable table = evaluate_pairs({{0.9, true}, {0.8, false}, {0.7, true}, {0.1, false}});
+  EXPECT_EQ(table.revisits, 2u);
+  EXPECT_NEAR(table.f1_max, 0.8, 1e-12);
+  EXPECT_NEAR(table.extended_precision, 0.75, 1e-12);
 }
 
 CandidateRow answer(int query, int match, double score) { return {FrameId{query}, FrameId{match}, score, false, ""}; }

@@ -2,21 +2,13 @@
 #include <revisit/evaluation/retrieval_table.hpp>
 
 #include <algorithm>
+#include <utility>
+
+#include <revisit/evaluation/internal/sweep.hpp>
 
 namespace revisit {
-namespace {
-
-struct Answer {
-  double score;
-  bool right;
-};
-
-}  // namespace
-
 RetrievalTable evaluate_retrieval(const std::vector<CandidateRow>& rows, const Reference& reference, RevisitKind kind) {
-  RetrievalTable table;
-  table.revisits = kind == RevisitKind::kAll ? reference.revisits().size() : reference.reverse_revisits();
-  std::vector<Answer> answers;
+  std::vector<evaluation_internal::Answer> answers;
   for (const CandidateRow& row : rows) {
     if (!row.match) continue;
     const auto distance_m = reference.distance_m(*row.match, row.query);
@@ -26,6 +18,13 @@ RetrievalTable evaluate_retrieval(const std::vector<CandidateRow>& rows, const R
     if (kind == RevisitKind::kReverse && is_revisit && !revisit->second.reverse) continue;
     answers.push_back({row.score, is_revisit && *distance_m <= reference.rules().same_place_m});
   }
+  return evaluation_internal::sweep(
+      std::move(answers), kind == RevisitKind::kAll ? reference.revisits().size() : reference.reverse_revisits());
+}
+
+RetrievalTable evaluation_internal::sweep(std::vector<Answer> answers, std::size_t count) {
+  RetrievalTable table;
+  table.revisits = count;
   std::stable_sort(answers.begin(), answers.end(), [](const Answer& a, const Answer& b) { return a.score > b.score; });
   table.answers = answers.size();
 

@@ -46,6 +46,13 @@ BaselineSearch::Answer BaselineSearch::answer(const Place& query, std::size_t se
   return answer;
 }
 
+double BaselineSearch::similarity_to(FrameId frame) const {
+  const auto found = std::lower_bound(places_.begin(), places_.end(), frame,
+                                      [](const Place& place, FrameId of) { return place.frame.frame < of; });
+  if (found == places_.end() || found->frame.frame != frame) return 0.0;
+  return method_->similarity(last_, found->signature);
+}
+
 std::optional<BaselineSearch::Answer> BaselineSearch::process(const FrameTime& query_frame,
                                                               std::span<const Point> points, double ground_z_m) {
   Place query;
@@ -58,6 +65,7 @@ std::optional<BaselineSearch::Answer> BaselineSearch::process(const FrameTime& q
       places_.begin(), places_.end(), [&](const Place& place) { return exclusion_.allows(query_frame, place.frame); });
   const auto searchable = static_cast<std::size_t>(too_recent - places_.begin());
   const auto found = searchable > 0 ? std::optional(answer(query, searchable)) : std::nullopt;
+  last_ = query.signature;
   query.signature = method_->kept(std::move(query.signature));
   bytes_ += query.signature.bytes() + static_cast<std::size_t>(query.key.size()) * sizeof(float);
   places_.push_back(std::move(query));

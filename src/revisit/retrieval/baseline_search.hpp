@@ -29,6 +29,9 @@ class BaselineSearch {
   };
   std::optional<Answer> process(const FrameTime& query, std::span<const Point> points, double ground_z_m);
 
+  /// How like the place of an earlier frame the last scan was; 0 where that frame is no place.
+  double similarity_to(FrameId frame) const;
+
   const Baseline& method() const { return *method_; }
   /// What the method keeps, in the mean.
   std::size_t bytes_a_place() const {
@@ -49,7 +52,8 @@ class BaselineSearch {
   std::unique_ptr<BaselineIndex> index_;  ///< null: places are compared by their keys, or all of them
   ExclusionRule exclusion_;
   std::deque<Place> places_;
-  std::size_t bytes_ = 0;  ///< of all signatures and keys
+  Baseline::Signature last_;  ///< the whole signature of the last scan
+  std::size_t bytes_ = 0;     ///< of all signatures and keys
 };
 
 }  // namespace revisit
