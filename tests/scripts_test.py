@@ -1,9 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """The scripts of data sets and rankings, on miniatures in the same layout. usage: scripts_test.py REVISIT"""
+import datetime
+import importlib.util
+import math
 import os
 import pathlib
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -42,6 +46,108 @@ class Scripts(unittest.TestCase):
         for word in ("Table 1", "Table 2", "Table 3", "lidar-iris"):
             self.assertIn(word, (out / "tables.txt").read_text())
         self.assertEqual(run(SCRIPTS / "datasets" / "kitti.sh", data, out, "11").returncode, 2)
+
+    def test_each_data_set_is_read_in_its_own_layout(self):
+        spec = importlib.util.spec_from_file_location("run", SCRIPTS / "datasets" / "run.py")
+        of = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(of)
+        made, name = self.folder / "made", "one"
+        self.assertEqual(run(REVISIT, "simulate", "--out", made, "--sensor", "vlp16", "--frames", 10).returncode, 0)
+        calib = next(line for line in (made / "calib.txt").read_text().splitlines() if line.startswith("Tr:"))
+        Tr = of.from_rows([float(word) for word in calib.split()[1:]])
+        truth = [of.product(of.product(of.inverse(Tr), of.from_rows(row)), Tr) for row in of.rows(made / "poses.txt")]
+        times = [float(line) for line in (made / "times.txt").read_text().split()]
+        scans = [path.read_bytes() for path in sorted((made / "velodyne").glob("*.bin"))]
+        points = [list(struct.iter_unpack("<4f", scan)) for scan in scans]
+        stamps = [1_500_000_000 + time for time in times]
+
+        def write(path, data):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data if isinstance(data, bytes) else data.encode())
+
+        def numbers(T):
+            return " ".join(f"{T[i][j]:.12g}" for i in range(3) for j in range(4))
+
+        def angles(T):
+            return [math.atan2(T[2][1], T[2][2]), math.asin(-T[2][0]), math.atan2(T[1][0], T[0][0])]
+
+        def at(T):
+            return [T[i][3] for i in range(3)]
+
+        def kitti360(folder):
+            lidar = folder / "data_3d_raw" / name / "velodyne_points"
+            for i, scan in enumerate(scans):
+                write(lidar / "data" / f"{i:010d}.bin", scan)
+            write(lidar / "timestamps.txt", "".join(
+                datetime.datetime.fromtimestamp(stamp, datetime.timezone.utc).strftime("%Y-%m-%d %H:%M:%S.%f000\n")
+                for stamp in stamps))
+            write(folder / "calibration" / "calib_cam_to_velo.txt", numbers(of.inverse(Tr)))
+            write(folder / "data_poses" / name / "cam0_to_world.txt", "".join(
+                f"{i} {numbers(of.product(T, of.inverse(Tr)))} 0 0 0 1\n" for i, T in enumerate(truth)))
+
+        def mulran(folder):
+            T_base_lidar = of.from_angles(1.7042, -0.021, 1.8047, *map(math.radians, (0.0001, 0.0003, 179.6654)))
+            for stamp, scan in zip(stamps, scans):
+                write(folder / name / "Ouster" / f"{round(stamp * 1e9)}.bin", scan)
+            write(folder / name / "global_pose.csv", "".join(
+                f"{round(stamp * 1e9)},{numbers(of.product(T, of.inverse(T_base_lidar))).replace(' ', ',')}\n"
+                for stamp, T in zip(stamps, truth)))
+
+        def nclt(folder):
+            T_body_velo = of.from_angles(0.002, -0.004, -0.957, *map(math.radians, (0.807, 0.166, -90.703)))
+            text = ""
+            for stamp, scan, T in zip(stamps, points, truth):
+                write(folder / name / "velodyne_sync" / f"{round(stamp * 1e6)}.bin", b"".join(
+                    struct.pack("<3H2B", *(round((axis + 100) / 0.005) for axis in (x, -y, -z)), 50, 3)
+                    for x, y, z, _ in scan if max(abs(x), abs(y), abs(z)) < 99))
+                body = of.product(of.product(of.product(of.FLIPPED, T), of.FLIPPED), of.inverse(T_body_velo))
+                text += ",".join(f"{word:.12g}" for word in [round(stamp * 1e6), *at(body), *angles(body)]) + "\n"
+            write(folder / f"groundtruth_{name}.csv", text)
+
+        def helipr(folder):
+            text = ""
+            for stamp, scan, T in zip(stamps, points, truth):
+                write(folder / name / "LiDAR" / "Ouster" / f"{round(stamp * 1e9)}.bin",
+                      b"".join(struct.pack("<4fI3H", *point, 7, 8, 9, 10) for point in scan))
+                text += " ".join(f"{word:.12g}" for word in [*at(T), *of.to_quaternion(T)]).join(
+                    (f"{round(stamp * 1e9)} ", "\n"))
+            write(folder / name / "LiDAR_GT" / "Ouster_gt.txt", text)
+
+        def apollo(folder):
+            text = ""
+            for i, (stamp, scan, T) in enumerate(zip(stamps, points, truth), 1):
+                head = (f"VERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\n"
+                        f"WIDTH {len(scan)}\nHEIGHT 1\nPOINTS {len(scan)}\nDATA binary\n")
+                write(folder / name / "pcds" / f"{i}.pcd", head.encode() + scans[i - 1])
+                text += f"{i} {stamp:.6f} " + " ".join(f"{word:.12g}" for word in [*at(T), *of.to_quaternion(T)]) + "\n"
+            write(folder / name / "poses" / "gt_poses.txt", text)
+
+        for make in (kitti360, mulran, nclt, helipr, apollo):
+            with self.subTest(make.__name__):
+                data, out = self.folder / make.__name__, self.folder / f"{make.__name__}_out"
+                command = (SCRIPTS / "datasets" / "run.py", make.__name__, data, out, name, "--methods",
+                           "scan-context-ring-key")
+                absent = run(*command)
+                self.assertEqual(absent.returncode, 1)
+                self.assertIn("missing: ", absent.stderr)
+                make(data)
+                done = run(*command)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                for word in ("Table 1", "Table 2", "Table 3", "scan-context-ring-key"):
+                    self.assertIn(word, (out / "tables.txt").read_text())
+                laid_out = list(of.rows(out / name / "recording" / "reference.tum"))
+                self.assertEqual(len(laid_out), len(truth), done.stderr)
+                first = of.from_quaternion(*laid_out[0][1:])
+                for row, T in zip(laid_out, truth):
+                    here = of.product(of.inverse(first), of.from_quaternion(*row[1:]))
+                    there = of.product(of.inverse(truth[0]), T)
+                    for i in range(3):
+                        for j in range(4):
+                            self.assertAlmostEqual(here[i][j], there[i][j], delta=2e-3)
+                # Poses and scans belong together: the trajectory from the scans alone follows the poses.
+                table = (out / "tables.txt").read_text().split("Table 3")[1].splitlines()
+                ate_m = next(float(line.split()[-6]) for line in table if " m " in line and "frames" not in line)
+                self.assertLess(ate_m, 0.1)
 
     def test_methods_are_ranked_over_runs(self):
         folders = []
