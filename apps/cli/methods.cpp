@@ -94,7 +94,11 @@ Methods::Methods(const Options& options, const Parameters& parameters, const Int
     return options.wanted.empty() ||
            std::find(options.wanted.begin(), options.wanted.end(), name) != options.wanted.end();
   };
-  const auto places = [&] { return std::make_unique<PlaceRecognition>(parameters, clouds_in_memory()); };
+  const auto places = [&] {
+    auto recognition = std::make_unique<PlaceRecognition>(parameters, clouds_in_memory());
+    recognition->expect_one_drive();
+    return recognition;
+  };
   if (is_wanted(kOurs)) add(kOurs, "this program, with the parameters given").places_ = places();
   if (is_wanted(kOurRetrieval))
     add(kOurRetrieval, "this program's index alone: its first answer, unverified").index_ =
@@ -246,7 +250,15 @@ Status Method::search(const PreparedScan& scan) {
 Status Method::recognise(const PreparedScan& scan, const TypicalAgreement& typical) {
   const std::size_t searchable = places_->index().searchable({scan.scan.frame, scan.scan.stamp_s});
   Result<Detection> detection = Detection{};
-  const double worked = time_ms([&] { detection = places_->find(scan, searchable, typical); });
+  const double worked = time_ms([&] {
+    detection = places_->find(scan, searchable, typical);
+    if (!detection) return;
+    auto earlier = places_->follow_back(*detection, scan.trajectory_point, typical);
+    if (earlier)
+      detection->earlier = *std::move(earlier);
+    else
+      detection = earlier.error();
+  });
   if (!detection) return detection.error();
   if (!baseline_) {
     report.retrieval_ms += scan.ms.describe + detection->search_ms;
@@ -262,9 +274,13 @@ Status Method::write(const Detection& detection, const std::optional<CandidateRo
   if (detection.searchable_places == 0) return ok();
   if (row)
     if (const Status status = writer_->add(*row); !status) return status;
-  if (!detection.loop) return ok();
-  if (!baseline_) given_poses.push_back({detection.loop->query, detection.loop->match, detection.loop->T_match_query});
-  return writer_->add(*detection.loop);
+  for (const LoopConstraint& loop : detection.loops()) {
+    if (!baseline_) given_poses.push_back({loop.query, loop.match, loop.T_match_query});
+    if (const Status status = writer_->add(loop); !status) return status;
+  }
+  if (!baseline_)
+    for (const Detection& each : detection.earlier) writer_->replace(each.row());
+  return ok();
 }
 
 }  // namespace revisit::cli
