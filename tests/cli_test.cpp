@@ -148,6 +148,12 @@ TEST(Cli, CompareRunsEachMethodOverTheSameScans) {
   }
   EXPECT_GT(fs::file_size(out / "precision_recall.png"), 1000u);
   EXPECT_NE(content(out / "comparison.json").find("\"recall_at_p100\""), std::string::npos);
+  for (const char* method : {"m2dp", "glarot3d", "lidar-iris", "nbld", "ring", "ring++", "solid"}) {
+    const auto rows = read_candidates(out / method / "candidates.csv");
+    ASSERT_TRUE(rows) << method;
+    EXPECT_EQ(rows->size(), 9u) << method;
+    for (const CandidateRow& row : *rows) EXPECT_TRUE(row.match) << method;
+  }
   // Scan Context answers every scan that has a past, ring key or not, with an earlier one.
   const auto answers = read_candidates(out / "scan-context" / "candidates.csv");
   ASSERT_TRUE(answers);

@@ -34,7 +34,7 @@ BaselineSearch::Answer BaselineSearch::answer(const Place& query, std::size_t se
   const auto best = std::max_element(similarity.begin(), similarity.end());
   Answer answer;
   answer.row.query = query.frame.frame;
-  if (best == similarity.end() || *best <= 0.0) {
+  if (best == similarity.end() || (index_ && *best <= 0.0)) {
     answer.row.reason = to_text(Refusal{Refusal::Reason::kNoCandidate});
     return answer;
   }

@@ -14,8 +14,9 @@
 
 namespace revisit {
 
-/// Places by a published descriptor: answers each scan with the place most like it, however little that is (but none
-/// where a similarity is 0), and adds the scan. Frames increase. Belongs to one thread at a time.
+/// Places by a published descriptor: answers each scan with the place most like it, however little that is (but
+/// with none where an index of its own finds none whose similarity is above 0), and adds the scan. Frames increase.
+/// Belongs to one thread at a time.
 class BaselineSearch {
  public:
   BaselineSearch(std::unique_ptr<Baseline> method, const ExclusionRule& exclusion)
