@@ -79,7 +79,8 @@ TEST(PairLists, AreOfOnePlaceOrOfTwoFarFromEachOther) {
       }
       (pair.is_same_place ? same : others) += 1;
     }
-  // Frame 100 + i lies 0, 1 and 2 m from five frames; of these 75, twice 74 and twice 74 are more than 50 frames before.
+  // Frame 100 + i lies 0, 1 and 2 m from five frames; of these 75, twice 74 and twice 74 are more than 50 frames
+  // before.
   EXPECT_EQ(same, 371u);
   EXPECT_EQ(others, 100 * same);
   const RetrievalTable table = evaluate_pairs({{0.9, true}, {0.8, false}, {0.7, true}, {0.1, false}});
