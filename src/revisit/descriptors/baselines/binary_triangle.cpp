@@ -17,7 +17,7 @@
 namespace revisit::descriptors_internal {
 namespace {
 
-constexpr std::size_t kScans = 10, kKeypoints = 60;
+constexpr std::size_t kKeypoints = 60;
 constexpr int kCells = 240, kAround = 2, kFewestOnes = 8;
 constexpr float kPixel_m = 0.5f, kReach_m = kCells * kPixel_m / 2.f, kLowest_m = 0.2f, kStep_m = 0.1f, kHighest_m = 5.f;
 constexpr float kVoxel_m = 2.f, kFlat_m2 = 0.01f;
@@ -84,25 +84,15 @@ std::vector<TriangleKeypoint> keypoints_of(const std::vector<Pixel>& image) {
   return keypoints;
 }
 
-class BinaryTriangle final : public Baseline {
+class BinaryTriangle final : public TriangleMethod {
  public:
   std::string name() const override { return "btc"; }
   std::string source() const override { return "Yuan et al., T-RO 2024; of the last ten scans"; }
-  Gives gives() const override { return Gives::kPose; }
-  std::size_t scans() const override { return kScans; }
 
   Signature describe(std::span<const Point> points, double ground_z_m) const override {
     return triangle_signature(keypoints_of(image_of(points, static_cast<float>(ground_z_m))),
                               surface_voxels(points, kVoxel_m, kFlat_m2), kTriangles);
   }
-
-  double similarity(const Signature& query, const Signature& place) const override {
-    return match_triangles(query, place).similarity;
-  }
-  Pose T_place_query(const Signature& query, const Signature& place) const override {
-    return match_triangles(query, place).T_place_query;
-  }
-  std::unique_ptr<BaselineIndex> make_index() const override { return make_triangle_index(); }
 };
 
 }  // namespace

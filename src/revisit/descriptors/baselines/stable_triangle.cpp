@@ -18,7 +18,7 @@
 namespace revisit::descriptors_internal {
 namespace {
 
-constexpr std::size_t kScans = 10, kKeypoints = 100;
+constexpr std::size_t kKeypoints = 100;
 constexpr float kVoxel_m = 2.f, kFlat_m2 = 0.01f, kPixel_m = 0.5f, kHighest_m = 5.f, kApart_m = 2.f;
 constexpr int kFewestPoints = 10, kAround = 2;
 constexpr TriangleOptions kTriangles{10, 50.f};
@@ -83,12 +83,10 @@ void add_keypoints(const std::vector<SurfaceVoxel>& voxels, const SurfaceVoxel& 
       found.push_back({{each.second.sum / static_cast<float>(each.second.points), plane.normal}, each.second.points});
 }
 
-class StableTriangle final : public Baseline {
+class StableTriangle final : public TriangleMethod {
  public:
   std::string name() const override { return "std"; }
   std::string source() const override { return "Yuan et al., ICRA 2023; of the last ten scans"; }
-  Gives gives() const override { return Gives::kPose; }
-  std::size_t scans() const override { return kScans; }
 
   Signature describe(std::span<const Point> points, double) const override {
     const std::vector<SurfaceVoxel> voxels = surface_voxels(points, kVoxel_m, kFlat_m2);
@@ -107,14 +105,6 @@ class StableTriangle final : public Baseline {
     }
     return triangle_signature(keypoints, voxels, kTriangles);
   }
-
-  double similarity(const Signature& query, const Signature& place) const override {
-    return match_triangles(query, place).similarity;
-  }
-  Pose T_place_query(const Signature& query, const Signature& place) const override {
-    return match_triangles(query, place).T_place_query;
-  }
-  std::unique_ptr<BaselineIndex> make_index() const override { return make_triangle_index(); }
 };
 
 }  // namespace

@@ -226,6 +226,25 @@ class TriangleIndex final : public BaselineIndex {
   std::size_t entries_ = 0;
 };
 
+struct TriangleMatch {
+  double similarity = 0.0;
+  Pose T_place_query = Pose::Identity();
+};
+
+TriangleMatch match_triangles(const Signature& query, const Signature& place) {
+  const Pairs pairs = agreeing_triangles(query, place);
+  Pairs best;
+  const std::size_t step = pairs.size() / kPosesTried + 1;
+  for (std::size_t i = 0; i < pairs.size(); i += step) {
+    Pairs together = brought_together(query, place, pairs, pose_of(query, place, std::span(&pairs[i], 1)));
+    if (together.size() > best.size()) best = std::move(together);
+  }
+  if (best.size() < kFewestMatches) return {};
+  const Eigen::Isometry3f T = pose_of(query, place, best);
+  Pose T_place_query(T.matrix().cast<double>());
+  return {share_of_planes(query, place, T), normalised(T_place_query)};
+}
+
 }  // namespace
 
 Signature triangle_signature(const std::vector<TriangleKeypoint>& keypoints, std::span<const SurfaceVoxel> voxels,
@@ -265,20 +284,12 @@ Signature triangle_signature(const std::vector<TriangleKeypoint>& keypoints, std
   return signature;
 }
 
-TriangleMatch match_triangles(const Signature& query, const Signature& place) {
-  const Pairs pairs = agreeing_triangles(query, place);
-  Pairs best;
-  const std::size_t step = pairs.size() / kPosesTried + 1;
-  for (std::size_t i = 0; i < pairs.size(); i += step) {
-    Pairs together = brought_together(query, place, pairs, pose_of(query, place, std::span(&pairs[i], 1)));
-    if (together.size() > best.size()) best = std::move(together);
-  }
-  if (best.size() < kFewestMatches) return {};
-  const Eigen::Isometry3f T = pose_of(query, place, best);
-  Pose T_place_query(T.matrix().cast<double>());
-  return {share_of_planes(query, place, T), normalised(T_place_query)};
+double TriangleMethod::similarity(const Signature& query, const Signature& place) const {
+  return match_triangles(query, place).similarity;
 }
-
-std::unique_ptr<BaselineIndex> make_triangle_index() { return std::make_unique<TriangleIndex>(); }
+Pose TriangleMethod::T_place_query(const Signature& query, const Signature& place) const {
+  return match_triangles(query, place).T_place_query;
+}
+std::unique_ptr<BaselineIndex> TriangleMethod::make_index() const { return std::make_unique<TriangleIndex>(); }
 
 }  // namespace revisit::descriptors_internal

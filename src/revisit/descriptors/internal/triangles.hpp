@@ -35,12 +35,14 @@ struct TriangleOptions {
 Baseline::Signature triangle_signature(const std::vector<TriangleKeypoint>& keypoints,
                                        std::span<const SurfaceVoxel> voxels, const TriangleOptions& options);
 
-struct TriangleMatch {
-  double similarity = 0.0;
-  Pose T_place_query = Pose::Identity();
+/// A method whose signatures these are, of the last ten scans.
+class TriangleMethod : public Baseline {
+ public:
+  Gives gives() const override { return Gives::kPose; }
+  std::size_t scans() const override { return 10; }
+  double similarity(const Signature& query, const Signature& place) const override;
+  Pose T_place_query(const Signature& query, const Signature& place) const override;
+  std::unique_ptr<BaselineIndex> make_index() const override;
 };
-TriangleMatch match_triangles(const Baseline::Signature& query, const Baseline::Signature& place);
-
-std::unique_ptr<BaselineIndex> make_triangle_index();
 
 }  // namespace revisit::descriptors_internal
