@@ -18,9 +18,8 @@ constexpr float kFocal = 320.f, kFarthest_m = 150.f;
 constexpr std::array kGrain_m{1.6f, 0.5f, 0.16f};  // wave lengths of what surfaces look like
 constexpr float kLeastGrain = 0.12f, kGrainOfRelief = 8.f, kMostGrain = 0.4f;  // painted; a metre of relief; grass
 constexpr float kMean = 105.f, kMostGain = 900.f, kNoise = 2.f;
-constexpr float kLamp_m = 9.f;                            // at which the own lamp is as bright as daylight in the shade
-constexpr double kCloud_s = 90.0;                         // in which clouds come and go
-constexpr double kSeason_s = 100.0, kSeasonsADay = 37.3;  // of foliage, as the scanner has it
+constexpr float kLamp_m = 9.f;     // at which the own lamp is as bright as daylight in the shade
+constexpr double kCloud_s = 90.0;  // in which clouds come and go
 
 float hash_at(std::uint64_t key, int i, int j) {
   return uniform(mix(key, as_key(i) << 32 ^ (as_key(j) & 0xffffffffu)));
@@ -132,7 +131,7 @@ Image Camera::picture(const Pose& T_local_lidar, double time_s, ImageLight light
   view.forward = R.col(0);
   view.left = R.col(1);
   view.up = R.col(2);
-  view.season = static_cast<float>(time_s / kSeason_s + kSeasonsADay * world_.day);
+  view.season = world_.season(time_s);
   view.is_inside = world_.roads.points().empty();
   const std::uint64_t day = world_.seed_of_day();
   if (light == ImageLight::kNight) {

@@ -13,8 +13,6 @@ namespace revisit::simulation_internal {
 namespace {
 
 constexpr double kFalloffStep_m = 0.25;
-constexpr double kSeason_s = 100.0;     // in which foliage changes: longer than a place is in sight
-constexpr double kSeasonsADay = 37.3;   // between two days that are simulated
 constexpr double kWeather_s = 150.0;    // in which rain, sun and wet surfaces come and go
 constexpr std::size_t kPoseKnots = 51;  // poses within a sweep, linear between them
 
@@ -229,7 +227,7 @@ bool Scanner::meets_own_roof(const Eigen::Vector3f& direction) const {
 void Scanner::cast(const Sweep& sweep, std::size_t first, std::size_t count, Return* returns) const {
   Met neighbour;
   Return before;
-  const auto season = static_cast<float>(sweep.time_s / kSeason_s + kSeasonsADay * world_.day);
+  const float season = world_.season(sweep.time_s);
   std::array<Ray, RayScene::kPacket> rays;
   std::array<Met, RayScene::kPacket> mets;
   const auto columns = static_cast<std::size_t>(sensor_.columns);

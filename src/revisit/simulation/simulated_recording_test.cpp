@@ -201,8 +201,9 @@ double correlation(const Scan& scan, const Image& image, bool is_mirrored) {
     const auto column = static_cast<int>(320.f - (is_mirrored ? -1.f : 1.f) * 320.f * p.y / p.x);
     const auto row = static_cast<int>(120.f - 320.f * p.z / p.x);
     if (column < 0 || column >= image.width || row < 0 || row >= image.height) continue;
-    const auto pixel = static_cast<std::size_t>(row * image.width + column);
-    pairs.emplace_back(std::min(0.6, static_cast<double>(p.intensity)), image.grey[pixel]);
+    const auto first = static_cast<std::size_t>(row) * static_cast<std::size_t>(image.width);
+    pairs.emplace_back(std::min(0.6, static_cast<double>(p.intensity)),
+                       image.grey[first + static_cast<std::size_t>(column)]);
   }
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const auto& pair : pairs) mean += pair / static_cast<double>(pairs.size());

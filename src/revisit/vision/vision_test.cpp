@@ -23,7 +23,7 @@ Image made_image(unsigned seed, int right = 0) {
     const auto grey = static_cast<std::uint8_t>(random() % 256);
     for (int r = row; r < std::min(200, row + height); ++r)
       for (int c = std::max(0, column); c < std::min(320, column + width); ++c)
-        image.grey[static_cast<std::size_t>(r * 320 + c)] = grey;
+        image.grey[static_cast<std::size_t>(r) * 320 + static_cast<std::size_t>(c)] = grey;
   }
   return image;
 }

@@ -47,7 +47,7 @@ std::vector<Pixel> image_of(std::span<const Point> points, float ground_z_m) {
 }
 
 int ones(const std::vector<Pixel>& image, int i, int j) {
-  return std::popcount(image[static_cast<std::size_t>(i * kCells + j)].code);
+  return std::popcount(image[static_cast<std::size_t>(i) * kCells + static_cast<std::size_t>(j)].code);
 }
 
 // Walls go on to both sides.
@@ -70,7 +70,7 @@ std::vector<TriangleKeypoint> keypoints_of(const std::vector<Pixel>& image) {
           // Of equal ones the first counts.
           is_most = std::pair(row, column) < std::pair(i, j) ? ones(image, row, column) < own
                                                              : ones(image, row, column) <= own;
-      const Pixel& pixel = image[static_cast<std::size_t>(i * kCells + j)];
+      const Pixel& pixel = image[static_cast<std::size_t>(i) * kCells + static_cast<std::size_t>(j)];
       if (is_most && !is_on_line(image, i, j))
         found.push_back({own, {pixel.sum / pixel.points, Eigen::Vector3f::UnitZ(), pixel.code}});
     }

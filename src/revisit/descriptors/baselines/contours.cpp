@@ -35,7 +35,7 @@ std::vector<std::size_t> grow(const Overhead& view, float level_m, std::size_t f
     const auto i = static_cast<int>(cells[next] / kCells), j = static_cast<int>(cells[next] % kCells);
     for (int row = std::max(0, i - 1); row <= std::min(kCells - 1, i + 1); ++row)
       for (int column = std::max(0, j - 1); column <= std::min(kCells - 1, j + 1); ++column) {
-        const auto cell = static_cast<std::size_t>(row * kCells + column);
+        const auto cell = static_cast<std::size_t>(row) * kCells + static_cast<std::size_t>(column);
         if (is_met[cell] || view.tops[cell].height_m < level_m) continue;
         is_met[cell] = true;
         cells.push_back(cell);

@@ -24,6 +24,10 @@ struct Moments {
   }
 };
 
+std::size_t index_of(const OverheadGrid& grid, int i, int j) {
+  return static_cast<std::size_t>(i) * static_cast<std::size_t>(grid.cells) + static_cast<std::size_t>(j);
+}
+
 // A cell after the other, from those of the lowest x on.
 std::vector<Moments> moments_of(std::span<const Point> points, const OverheadGrid& grid, float lowest_m) {
   std::vector<Moments> moments(static_cast<std::size_t>(grid.cells) * static_cast<std::size_t>(grid.cells));
@@ -74,7 +78,7 @@ OverheadCells collect(const std::vector<Moments>& moments, const OverheadGrid& g
   Eigen::Index used = 0;
   for (int i = 0; i < grid.cells; ++i)
     for (int j = 0; j < grid.cells; ++j) {
-      if (moments[static_cast<std::size_t>(i * grid.cells + j)].count == 0.f) continue;
+      if (moments[index_of(grid, i, j)].count == 0.f) continue;
       if (!feature_of(i, j, cells.features.col(used))) continue;
       cells.centres.col(used++) = centre_of(grid, i, j);
     }
@@ -98,7 +102,7 @@ OverheadCells eigenvalue_features(std::span<const Point> points, const OverheadG
     Moments around;
     for (int row = std::max(0, i - 1); row <= std::min(grid.cells - 1, i + 1); ++row)
       for (int column = std::max(0, j - 1); column <= std::min(grid.cells - 1, j + 1); ++column)
-        around += moments[static_cast<std::size_t>(row * grid.cells + column)];
+        around += moments[index_of(grid, row, column)];
     if (around.count < kFewestPoints) return false;
     feature = features_of(around);
     return true;

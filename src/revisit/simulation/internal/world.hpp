@@ -42,6 +42,12 @@ struct World {
   /// Of what differs from day to day.
   std::uint64_t seed_of_day() const { return day == 0 ? seed : mix(seed, 211, static_cast<std::uint64_t>(day)); }
 
+  /// In which foliage changes: longer than a place is in sight, and many between two days that are simulated.
+  float season(double time_s) const {
+    constexpr double kSeason_s = 100.0, kSeasonsADay = 37.3;
+    return static_cast<float>(time_s / kSeason_s + kSeasonsADay * day);
+  }
+
   Ground ground_at(float x, float y) const;
   /// Height of what stands at a place.
   double stand_z(double x, double y) const {
