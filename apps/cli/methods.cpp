@@ -77,6 +77,7 @@ std::vector<std::string> Methods::names() {
 
 std::vector<std::string> Methods::vision_names() {
   std::vector<std::string> names;
+  names.reserve(kVision.size());
   for (const VisionRow& row : kVision) names.emplace_back(row.name);
   return names;
 }
@@ -199,7 +200,7 @@ Status Method::answer(const Scan& raw, const PreparedScan* prepared, const Recen
     if (index_) status = search(*prepared);
     if (baseline_) status = retrieve(*prepared, recent);
     if (wanted_pairs != nullptr && (index_ || baseline_) && wanted_pairs->contains(prepared->scan.frame))
-      for (const Pair& pair : wanted_pairs->at(prepared->scan.frame))
+      for (const FramePair& pair : wanted_pairs->at(prepared->scan.frame))
         pairs.push_back({similarity_to(pair.match, *prepared), pair.is_same_place});
     if (status && places_) status = recognise(*prepared, typical);
   });

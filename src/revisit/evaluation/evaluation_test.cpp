@@ -68,7 +68,7 @@ TEST(PairLists, AreOfOnePlaceOrOfTwoFarFromEachOther) {
   const PairLists lists = make_pair_lists(reference.trajectory());
   std::size_t same = 0, others = 0;
   for (const auto& [query, pairs] : lists)
-    for (const Pair& pair : pairs) {
+    for (const FramePair& pair : pairs) {
       const double distance_m = *reference.distance_m(pair.match, query);
       EXPECT_LT(pair.match, query);
       if (pair.is_same_place) {

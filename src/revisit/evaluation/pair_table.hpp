@@ -10,12 +10,12 @@
 namespace revisit {
 
 /// Two frames, the query the later one, that are of one place or of two.
-struct Pair {
+struct FramePair {
   FrameId match;
   bool is_same_place = false;
 };
 /// By query.
-using PairLists = std::map<FrameId, std::vector<Pair>>;
+using PairLists = std::map<FrameId, std::vector<FramePair>>;
 
 /// The pairs of the SSC lineage (Li et al., IROS 2021): all that are less than 3 m apart and more than 50 frames, and
 /// of those that are more than 20 m apart 100 for each of them, drawn by `seed`. What lies between is left out.

@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t kScans = 50, kEach = 10, kFewestInliers = 6;
 constexpr int kCells = 320, kMostDifferent = 50, kTries = 200;
 constexpr float kCell_m = 0.5f, kReach_m = kCells * kCell_m / 2.f, kFaintest = 0.05f, kSame_m = 3.f * kCell_m;
-constexpr FeatureOptions kFeatures{300, 1, 35};
+constexpr FeatureOptions kDensityFeatures{300, 1, 35};
 
 Image density_of(std::span<const Point> points) {
   std::vector<float> counts(std::size_t{kCells} * kCells);
@@ -48,7 +48,7 @@ class DensityMap final : public Baseline {
 
   // `values`: where the features are, in metres; `bits`: four words each.
   Signature describe(std::span<const Point> points, double) const override {
-    const std::vector<BinaryFeature> features = find_features(density_of(points), kFeatures);
+    const std::vector<BinaryFeature> features = find_features(density_of(points), kDensityFeatures);
     Signature signature;
     signature.values.resize(2, static_cast<Eigen::Index>(features.size()));
     for (std::size_t i = 0; i < features.size(); ++i) {

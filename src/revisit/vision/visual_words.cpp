@@ -15,6 +15,7 @@ constexpr double kLeastExpected = 0.02;  // pictures of nothing, one after the o
 
 std::shared_ptr<const Vocabulary> make_vocabulary(const std::vector<Image>& images) {
   std::vector<std::vector<BinaryFeature>> features;
+  features.reserve(images.size());
   for (const Image& image : images) features.push_back(find_features(image, kFeatures));
   return std::make_shared<const Vocabulary>(features);
 }

@@ -40,6 +40,7 @@ std::vector<std::vector<Bits>> split(const std::vector<Bits>& all, std::vector<B
   // Each further one far from those there are (k-means++).
   while (centres.size() < std::min(kBranches, all.size())) {
     std::vector<double> odds;
+    odds.reserve(all.size());
     for (const Bits& bits : all) odds.push_back(std::pow(hamming(centres[nearest_of(centres, bits)], bits), 2));
     if (*std::max_element(odds.begin(), odds.end()) == 0.0) break;  // all are among them
     centres.push_back(all[std::discrete_distribution<std::size_t>(odds.begin(), odds.end())(random)]);

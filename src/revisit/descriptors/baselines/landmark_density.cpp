@@ -39,6 +39,7 @@ std::vector<Eigen::Vector3f> landmarks_of(std::span<const Point> points, float g
     voxels.try_emplace({cell(p.x), cell(p.y), cell(p.z)}, p.x, p.y, up_m);
   }
   std::vector<Eigen::Vector3f> landmarks;
+  landmarks.reserve(voxels.size());
   for (const auto& [cell, point] : voxels) landmarks.push_back(point);
   return landmarks;
 }
