@@ -160,6 +160,10 @@ TEST(Cli, CompareRunsEachMethodOverTheSameScans) {
   EXPECT_EQ(answers->size(), 9u);
   for (const CandidateRow& row : *answers) EXPECT_LE(row.match->value, row.query.value - 3);
 
+  EXPECT_TRUE(fs::exists(out / "ring" / "report.html"));
+  EXPECT_GT(fs::file_size(out / "ring" / "trajectory.png"), 1000u);
+  EXPECT_EQ(content(out / "isc-paper" / "failures.csv").find("query,what,match"), 0u);
+  EXPECT_NE(content(out / "isc-paper" / "failures.csv").find(",missed,"), std::string::npos) << "it answers nothing";
   EXPECT_NE(content(out / "comparison.tex").find("scan-context++ &"), std::string::npos);
   EXPECT_NE(all.output.find("6-DoF"), std::string::npos) << all.output;
   EXPECT_NE(content(out / "comparison.csv").find(",3-DoF,1,"), std::string::npos);

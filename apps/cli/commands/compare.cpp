@@ -13,6 +13,7 @@
 #include "progress.hpp"
 #include "read_ahead.hpp"
 #include "reports/comparison.hpp"
+#include "reports/method_page.hpp"
 
 namespace revisit::cli {
 namespace {
@@ -46,18 +47,16 @@ Result<std::size_t> run_all(Methods& methods, const Recording& recording) {
   return skipped;
 }
 
-Result<EvaluationReport> evaluate(const fs::path& candidates_file, const std::optional<fs::path>& loops_file,
-                                  const Reference& reference, const CompareOptions& options,
-                                  const EvaluationRules& rules) {
-  const auto candidates = read_candidates(candidates_file);
-  if (!candidates) return candidates.error();
+Result<EvaluationReport> evaluate(const fs::path& candidates_file, const std::vector<CandidateRow>& candidates,
+                                  const std::optional<fs::path>& loops_file, const Reference& reference,
+                                  const CompareOptions& options, const EvaluationRules& rules) {
   const auto loops = loops_file ? read_loops(*loops_file) : Result(std::vector<LoopConstraint>{});
   if (!loops) return loops.error();
   return EvaluationReport{candidates_file.parent_path().string(),
                           options.poses.empty() ? options.input : options.poses,
                           rules,
-                          evaluate_retrieval(*candidates, reference),
-                          evaluate_retrieval(*candidates, reference, RevisitKind::kReverse),
+                          evaluate_retrieval(candidates, reference),
+                          evaluate_retrieval(candidates, reference, RevisitKind::kReverse),
                           evaluate_loops(*loops, reference),
                           {}};
 }
@@ -72,10 +71,15 @@ Result<std::vector<MethodReport>> evaluate_all(Methods& methods, const Recording
   for (const auto& method : methods.all()) {
     if (const Status status = method->finish(); !status) return status.error();
     const fs::path folder = fs::path(options.out) / method->report.name;
-    auto evaluation = evaluate(folder / "candidates.csv", folder / "loops.csv", reference, options, rules);
+    const auto candidates = read_candidates(folder / "candidates.csv");
+    if (!candidates) return candidates.error();
+    auto evaluation = evaluate(folder / "candidates.csv", *candidates, folder / "loops.csv", reference, options, rules);
     if (!evaluation) return evaluation.error();
     MethodReport& report = reports.emplace_back(std::move(method->report));
     report.evaluation = *std::move(evaluation);
+    if (const Status status = write_method_page(folder, report.evaluation, *candidates, reference, report.is_verified);
+        !status)
+      return status.error();
     report.poses =
         evaluate_given_poses(method->given_poses, reference, method->report.gives == Baseline::Gives::kPlanarPose);
     if (!method->pairs.empty()) report.pairs = evaluate_pairs(method->pairs);
@@ -84,7 +88,9 @@ Result<std::vector<MethodReport>> evaluate_all(Methods& methods, const Recording
   }
   for (const std::string& each : options.candidates) {
     const std::size_t equals = each.find('=');
-    auto evaluation = evaluate(each.substr(equals + 1), std::nullopt, reference, options, rules);
+    const auto candidates = read_candidates(each.substr(equals + 1));
+    if (!candidates) return candidates.error();
+    auto evaluation = evaluate(each.substr(equals + 1), *candidates, std::nullopt, reference, options, rules);
     if (!evaluation) return evaluation.error();
     MethodReport& report = reports.emplace_back();
     report.name = each.substr(0, equals);
@@ -153,9 +159,10 @@ Run add_compare(CLI::App& program) {
   std::string footer =
       "Prints tables 1 and 2 (docs/evaluation.md) with a row a method, judged by the poses of the recording, and "
       "writes\n"
-      "comparison.txt, .csv, .tex, .json, precision_recall.png and a folder a method with its candidates.csv and\n"
-      "loops.csv. Each method works on one thread, may answer with the same earlier scans, and takes scans that were\n"
-      "prepared in the same way (ground, intensity, sweep); isc-paper prepares them by its own preset.\n\n"
+      "comparison.txt, .csv, .tex, .json, precision_recall.png and a folder a method with its candidates.csv,\n"
+      "loops.csv, failures.csv and a page (report.html). Each method works on one thread, may answer with the\n"
+      "same earlier scans, and takes scans that were prepared in the same way (ground, intensity, sweep);\n"
+      "isc-paper prepares them by its own preset.\n\n"
       "Methods of your own: --candidates with the candidates.csv (docs/formats.md) of any program, or\n"
       "revisit.compare(own=...) in Python.\n\n"
       "Methods:\n"

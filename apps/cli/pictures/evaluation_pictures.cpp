@@ -57,7 +57,8 @@ Status draw_precision_recall(const std::filesystem::path& file, const std::vecto
   return canvas.save_png(file);
 }
 
-Status draw_trajectory(const std::filesystem::path& file, const Reference& reference, const LoopTable& loops) {
+Status draw_trajectory(const std::filesystem::path& file, const Reference& reference, const LoopTable& loops,
+                       const std::string& what) {
   const auto& entries = reference.trajectory().entries;
   Chart::Range x{1e30, -1e30}, y{1e30, -1e30};
   for (const auto& [frame, entry] : entries) {
@@ -95,8 +96,8 @@ Status draw_trajectory(const std::filesystem::path& file, const Reference& refer
     before = &entry.T_world_lidar;
   }
   draw_loops(false);
-  const std::string text = format("%zu frames, %zu revisits, %zu accepted loops (red), %zu of them false (black)",
-                                  entries.size(), loops.revisits, loops.accepted, loops.false_loops);
+  const std::string text = format("%zu frames, %zu revisits, %zu %s (red), %zu of them false (black)", entries.size(),
+                                  loops.revisits, loops.accepted, what.c_str(), loops.false_loops);
   canvas.text({525, 950}, text, 15, Align::kCentre);
   return canvas.save_png(file);
 }

@@ -26,7 +26,8 @@ Status draw_precision_recall(const std::filesystem::path& file, const RetrievalT
                              const RetrievalTable& reverse);
 
 /// The reference trajectory from above, light to dark as time goes; right loops red below it, false ones black above
-/// it, each with a line to its match.
-Status draw_trajectory(const std::filesystem::path& file, const Reference& reference, const LoopTable& loops);
+/// it, each with a line to its match. `what` they are, for people.
+Status draw_trajectory(const std::filesystem::path& file, const Reference& reference, const LoopTable& loops,
+                       const std::string& what = "accepted loops");
 
 }  // namespace revisit::cli
