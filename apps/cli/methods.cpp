@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <ctime>
+#include <limits>
 #include <utility>
 
 #include <oneapi/tbb/parallel_for.h>
@@ -33,23 +34,6 @@ constexpr std::array kVision{VisionRow{"visual-words", "by day", false, false},
                              VisionRow{"visual-words-night", "by night", true, true},
                              VisionRow{"visual-words-day-night", "first by day, then by night", false, true}};
 
-// Images of another drive through another world of this kind, by day and by night.
-std::shared_ptr<const Vocabulary> vocabulary_beside(const SimulatedRecording& recording) {
-  constexpr std::size_t kMostImages = 200, kStep = 4;  // of scans that follow each other most is the same
-  SimulationOptions options = recording.options();
-  options.seed += 1000;
-  options.trajectory.clear();
-  options.frames = 0;
-  std::vector<Image> images;
-  if (const auto other = simulate(options)) {
-    const std::size_t wanted = std::min(kMostImages, (*other)->size() / kStep);
-    for (std::size_t i = 0; i < wanted; ++i)
-      images.push_back(
-          (*other)->image(i * (*other)->size() / wanted, i % 2 == 0 ? ImageLight::kDay : ImageLight::kNight));
-  }
-  return make_vocabulary(images);
-}
-
 std::size_t bytes_of(const IntensityScanContext& descriptor) {
   return descriptor.intensity.size() + descriptor.occupancy.size() * sizeof(std::uint64_t);
 }
@@ -67,6 +51,24 @@ std::vector<std::unique_ptr<Baseline>> all_baselines() {
   auto all = make_baselines();
   all.push_back(make_density_map());
   return all;
+}
+
+Result<std::shared_ptr<const Vocabulary>> vocabulary_beside(const SimulatedRecording& recording) {
+  constexpr std::size_t kMostImages = 200, kStep = 4;  // of scans that follow each other most is the same
+  SimulationOptions options;
+  options.world = recording.options().world;
+  options.sensor = recording.options().sensor;
+  options.difficulty = recording.options().difficulty;
+  options.length_m = recording.options().length_m;
+  options.seed = recording.options().seed + 1000;
+  const auto other = simulate(options);
+  if (!other) return Error{"the drive that visual words are learnt from: " + other.error().message};
+  const std::size_t wanted = std::min(kMostImages, (*other)->size() / kStep);
+  std::vector<Image> images;
+  for (std::size_t i = 0; i < wanted; ++i)
+    images.push_back(
+        (*other)->image(i * (*other)->size() / wanted, i % 2 == 0 ? ImageLight::kDay : ImageLight::kNight));
+  return make_vocabulary(images);
 }
 
 std::vector<std::string> Methods::names() {
@@ -116,7 +118,10 @@ Methods::Methods(const Options& options, const Parameters& parameters, const Int
     Method& method = add(baseline->name(), baseline->source());
     method.report.gives = baseline->gives();
     method.report.scans = baseline->scans();
-    if (baseline->scans() > 1) most_scans = std::max(most_scans, baseline->scans());
+    if (baseline->scans() > 1) {
+      most_scans = std::max(most_scans, baseline->scans());
+      together_[baseline->scans()];
+    }
     method.baseline_ = std::make_unique<BaselineSearch>(std::move(baseline), parameters.retrieval);
     if (!options.verifies_all) continue;
     method.places_ = places();
@@ -126,7 +131,7 @@ Methods::Methods(const Options& options, const Parameters& parameters, const Int
   }
   recent_ = RecentScans(most_scans);
   camera_ = options.camera;
-  if (camera_ != nullptr) add_vision(options.wanted, parameters.retrieval);
+  if (camera_ != nullptr && options.vocabulary) add_vision(options, parameters.retrieval);
   for (auto& method : all_) {
     method->report.is_verified = method->places_ || method->detector_;
     method->wanted_pairs = options.pairs;
@@ -134,14 +139,12 @@ Methods::Methods(const Options& options, const Parameters& parameters, const Int
   }
 }
 
-void Methods::add_vision(const std::vector<std::string>& wanted, const ExclusionRule& exclusion) {
-  std::shared_ptr<const Vocabulary> vocabulary;
+void Methods::add_vision(const Options& options, const ExclusionRule& exclusion) {
   for (const VisionRow& row : kVision) {
-    if (std::find(wanted.begin(), wanted.end(), row.name) == wanted.end()) continue;
-    if (!vocabulary) vocabulary = vocabulary_beside(*camera_);
+    if (std::find(options.wanted.begin(), options.wanted.end(), row.name) == options.wanted.end()) continue;
     Method& method =
         add(row.name, std::string("Galvez-Lopez and Tardos, T-RO 2012 (DBoW2), of images of a camera, ") + row.light);
-    method.words_ = std::make_unique<VisualWords>(vocabulary, exclusion);
+    method.words_ = std::make_unique<VisualWords>(options.vocabulary, exclusion);
     looks_.push_back({&method, row.by_night_first, row.by_night_then});
   }
 }
@@ -160,11 +163,14 @@ Status Methods::answer(const Scan& scan, std::size_t index) {
   if (!looks_.empty())
     if (const Status status = look({scan.frame, scan.stamp_s}, index); !status) return status;
   const auto step = front_end_.step(scan);
-  if (step) recent_.add(step->scan);
+  if (step) {
+    recent_.add(step->scan);
+    for (auto& [scans, points] : together_) points = recent_.together(scans);
+  }
   const TypicalAgreement typical = front_end_.typical().recent();
   std::vector<Status> statuses(all_.size(), ok());
   tbb::parallel_for(std::size_t{0}, all_.size(), [&](std::size_t i) {
-    statuses[i] = all_[i]->answer(scan, step ? &step->scan : nullptr, recent_, typical);
+    statuses[i] = all_[i]->answer({scan, step ? &step->scan : nullptr, together_, typical});
   });
   const auto failed = std::find_if(statuses.begin(), statuses.end(), [](const Status& status) { return !status; });
   return failed == statuses.end() ? ok() : *failed;
@@ -184,33 +190,42 @@ Status Method::answer(const FrameTime& frame, const Image& image) {
   return row ? writer_->add(*row) : ok();
 }
 
-Status Method::answer(const Scan& raw, const PreparedScan* prepared, const RecentScans& recent,
-                      const TypicalAgreement& typical) {
+Status Method::answer(const Query& query) {
   Status status = ok();
   one_thread_->execute([&] {
     if (detector_) {
-      const auto detection = detector_->process(raw);
+      const auto detection = detector_->process(query.raw);
       if (!detection) return;  // a scan that shows no place has no answer
       report.retrieval_ms += detection->preparation_ms.describe + detection->search_ms;
       report.verification_ms += detection->geometric_ms;  // with temporal_ms
       status = write(*detection, detection->row());
       return;
     }
-    if (!prepared || words_) return;
-    if (index_) status = search(*prepared);
-    if (baseline_) status = retrieve(*prepared, recent);
-    if (wanted_pairs != nullptr && (index_ || baseline_) && wanted_pairs->contains(prepared->scan.frame))
-      for (const FramePair& pair : wanted_pairs->at(prepared->scan.frame))
-        pairs.push_back({similarity_to(pair.match, *prepared), pair.is_same_place});
-    if (status && places_) status = recognise(*prepared, typical);
+    if (query.prepared != nullptr) {
+      if (index_) status = search(*query.prepared);
+      if (baseline_) status = retrieve(query);
+    }
+    if (wanted_pairs != nullptr && (index_ || baseline_)) score_pairs(query);
+    if (query.prepared != nullptr && status && places_) status = recognise(*query.prepared, query.typical);
   });
   return status;
 }
 
-Status Method::retrieve(const PreparedScan& scan, const RecentScans& recent) {
+// A frame that is no place is like none.
+void Method::score_pairs(const Query& query) {
+  const auto wanted = wanted_pairs->find(query.raw.frame);
+  if (wanted == wanted_pairs->end()) return;
+  constexpr double kLeast = -std::numeric_limits<double>::infinity();
+  for (const FramePair& pair : wanted->second) {
+    const auto alike = query.prepared == nullptr ? std::nullopt : similarity_to(pair.match, *query.prepared);
+    pairs.push_back({alike.value_or(kLeast), pair.is_same_place});
+  }
+}
+
+Status Method::retrieve(const Query& query) {
+  const PreparedScan& scan = *query.prepared;
   const std::size_t scans = baseline_->method().scans();
-  const std::vector<Point> together = scans > 1 ? recent.together(scans) : std::vector<Point>{};
-  const std::vector<Point>& points = scans > 1 ? together : scan.scan.points;
+  const std::vector<Point>& points = scans > 1 ? query.together.at(scans) : scan.scan.points;
   std::optional<BaselineSearch::Answer> answer;
   report.retrieval_ms += time_ms([&] {
     answer = baseline_->process({scan.scan.frame, scan.scan.stamp_s}, points, scan.ground_z_m);
@@ -224,10 +239,11 @@ Status Method::retrieve(const PreparedScan& scan, const RecentScans& recent) {
 }
 
 // Of what retrieval alone knows.
-double Method::similarity_to(FrameId frame, const PreparedScan& scan) const {
+std::optional<double> Method::similarity_to(FrameId frame, const PreparedScan& scan) const {
   if (baseline_) return baseline_->similarity_to(frame);
   const auto found = descriptors_.find(frame);
-  return found == descriptors_.end() ? 0.0 : match_descriptors(scan.descriptor, found->second).score();
+  if (found == descriptors_.end()) return std::nullopt;
+  return match_descriptors(scan.descriptor, found->second).score();
 }
 
 Status Method::search(const PreparedScan& scan) {

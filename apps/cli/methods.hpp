@@ -36,17 +36,23 @@ class Method {
 
   /// Of a method that looks at images.
   Status answer(const FrameTime& frame, const Image& image);
-  /// `raw` as the recording has it; `prepared`: null where the scan describes no place; `recent`: up to it.
-  Status answer(const Scan& raw, const PreparedScan* prepared, const RecentScans& recent,
-                const TypicalAgreement& typical);
+  /// A scan as the recording has it and as it was prepared, with the last ones laid together, by how many.
+  struct Query {
+    const Scan& raw;
+    const PreparedScan* prepared;  ///< null where the scan describes no place
+    const std::map<std::size_t, std::vector<Point>>& together;
+    const TypicalAgreement& typical;
+  };
+  Status answer(const Query& query);
   Status open(const std::filesystem::path& folder, ResultWriter::Existing existing);
   Status finish() { return writer_->finish(); }
 
  private:
   friend class Methods;
-  Status retrieve(const PreparedScan& scan, const RecentScans& recent);
+  Status retrieve(const Query& query);
   Status search(const PreparedScan& scan);
-  double similarity_to(FrameId frame, const PreparedScan& scan) const;
+  void score_pairs(const Query& query);
+  std::optional<double> similarity_to(FrameId frame, const PreparedScan& scan) const;
   Status recognise(const PreparedScan& scan, const TypicalAgreement& typical);
   Status write(const Detection& detection, const std::optional<CandidateRow>& row);
 
@@ -66,14 +72,18 @@ class Method {
 /// The published methods: make_baselines(), and those that need OpenCV.
 std::vector<std::unique_ptr<Baseline>> all_baselines();
 
+/// Words from images of another drive through another world of the same kind, by day and by night.
+Result<std::shared_ptr<const Vocabulary>> vocabulary_beside(const SimulatedRecording& recording);
+
 /// Those that are wanted, and what comes before all of them.
 class Methods {
  public:
   struct Options {
     std::vector<std::string> wanted;  ///< empty: all
     bool verifies_all = false;        ///< what baselines answer is registered as this program does
-    /// Whose camera the methods of vision_names() look through, which must outlive this; null: without them.
+    /// Of vision_names(): whose camera they look through, which must outlive this, and their words; null: without them.
     const SimulatedRecording* camera = nullptr;
+    std::shared_ptr<const Vocabulary> vocabulary = nullptr;
     const PairLists* pairs = nullptr;  ///< which the methods score beside their answers; must outlive this
   };
   static std::vector<std::string> names();
@@ -86,11 +96,12 @@ class Methods {
 
  private:
   Method& add(const std::string& name, const std::string& source);
-  void add_vision(const std::vector<std::string>& wanted, const ExclusionRule& exclusion);
+  void add_vision(const Options& options, const ExclusionRule& exclusion);
   Status look(const FrameTime& frame, std::size_t index);
 
   DetectionFrontEnd front_end_;
   RecentScans recent_{0};
+  std::map<std::size_t, std::vector<Point>> together_;  ///< the last scans, by how many: of the scan at hand
   const SimulatedRecording* camera_ = nullptr;
   struct Look {
     Method* method;

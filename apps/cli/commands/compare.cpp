@@ -113,12 +113,20 @@ int compare(const CompareOptions& options) {
   for (const std::string& each : options.candidates)  // not after hours
     if (const auto rows = read_candidates(each.substr(each.find('=') + 1)); !rows) return fail(rows.error());
   const auto* const camera = dynamic_cast<const SimulatedRecording*>(recording->get());
-  for (const std::string& vision : Methods::vision_names())
-    if (camera == nullptr && std::find(options.methods.begin(), options.methods.end(), vision) != options.methods.end())
+  std::shared_ptr<const Vocabulary> vocabulary;
+  for (const std::string& vision : Methods::vision_names()) {
+    if (vocabulary || std::find(options.methods.begin(), options.methods.end(), vision) == options.methods.end())
+      continue;
+    if (camera == nullptr)
       return fail({options.input + ": has no images for " + vision + "; simulated drives (.toml) have"});
+    const auto made = vocabulary_beside(*camera);
+    if (!made) return fail(made.error());
+    vocabulary = *made;
+  }
   const PairLists pairs = options.pairs ? make_pair_lists((*recording)->trajectory()) : PairLists{};
   if (options.pairs && pairs.empty()) return fail({options.input + ": no two of its frames are of one place (3 m)"});
-  Methods methods({options.methods, options.verify, camera, options.pairs ? &pairs : nullptr}, *parameters, *scale);
+  Methods methods({options.methods, options.verify, camera, vocabulary, options.pairs ? &pairs : nullptr}, *parameters,
+                  *scale);
   for (const auto& method : methods.all())
     if (const Status status =
             method->open(fs::path(options.out) / method->report.name,
@@ -178,13 +186,11 @@ Run add_compare(CLI::App& program) {
   command->footer(footer + "\nExample: revisit compare kitti/sequences/00 --poses kitti/poses/00.txt --out compared");
   command->add_option("input", options->input, "Recording with poses, or .toml of a simulated drive")->required();
   command->add_option("--out", options->out, "Folder for the results")->required();
+  std::vector<std::string> known = Methods::names();
+  for (const std::string& vision : Methods::vision_names()) known.push_back(vision);
   command->add_option("--methods", options->methods, "Only these (separated by commas); default: all")
       ->delimiter(',')
-      ->check(CLI::IsMember([] {
-        auto names = Methods::names();
-        for (const std::string& vision : Methods::vision_names()) names.push_back(vision);
-        return names;
-      }()));
+      ->check(CLI::IsMember(known));
   command->add_flag("--verify", options->verify,
                     "Register what each method answers as this program does, and judge it by table 2");
   command->add_flag("--pairs", options->pairs,
@@ -192,15 +198,14 @@ Run add_compare(CLI::App& program) {
   command
       ->add_option("--candidates", options->candidates,
                    "NAME=FILE: judge the candidates.csv of another program beside them; may be repeated")
-      ->check([](const std::string& text) {
+      ->check([known](const std::string& text) {
         const std::size_t equals = text.find('=');
         if (equals == std::string::npos || equals == 0) return std::string("NAME=FILE is wanted");
         const std::string name = text.substr(0, equals);
         if (std::any_of(name.begin(), name.end(),
                         [](unsigned char c) { return std::isalnum(c) == 0 && c != '-' && c != '+' && c != '.'; }))
           return name + ": allowed in a name: letters, digits, - + .";
-        const std::vector<std::string> taken = Methods::names();
-        return std::find(taken.begin(), taken.end(), name) == taken.end() ? std::string() : name + ": is taken";
+        return std::find(known.begin(), known.end(), name) == known.end() ? std::string() : name + ": is taken";
       });
   command->add_option("--poses", options->poses, "Pose file (KITTI, TUM, g2o), instead of the recording's own poses");
   command->add_flag("--overwrite", options->overwrite, "Replace results that are already in the folder");

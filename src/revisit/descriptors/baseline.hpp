@@ -46,11 +46,11 @@ class Baseline {
   virtual std::string source() const = 0;  ///< the paper
 
   virtual Gives gives() const { return Gives::kPlace; }
-  /// The scans that are described together, the last of them in whose frame they are: more than one needs odometry.
+  /// How many scans are described together, in the frame of the last one; more than one are laid together by odometry.
   virtual std::size_t scans() const { return 1; }
 
-  /// `points`: of scans() scans, finite, metres, LiDAR frame, intensity in [0, 1]; `ground_z_m`: where the ground lies
-  /// in that frame.
+  /// `points`: of that many scans, finite, metres, LiDAR frame, intensity in [0, 1]; `ground_z_m`: where the ground
+  /// lies in that frame.
   virtual Signature describe(std::span<const Point> points, double ground_z_m) const = 0;
 
   /// What of a signature is kept once the scan is a place.
@@ -59,7 +59,7 @@ class Baseline {
   /// How alike two places are; larger is more alike, the scale is the method's own.
   virtual double similarity(const Signature& query, const Signature& place) const = 0;
 
-  /// As far as the method gives it; the rest is 0.
+  /// Where the query stands in the frame of the place, as far as gives() says; what is not given is 0.
   virtual Pose T_place_query(const Signature& /*query*/, const Signature& /*place*/) const { return Pose::Identity(); }
 
   /// Where the method compares only the places whose keys are nearest (Euclidean): the key, and how many.

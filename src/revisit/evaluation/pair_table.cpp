@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/evaluation/pair_table.hpp>
 
+#include <algorithm>
 #include <random>
+#include <utility>
 
 #include <revisit/evaluation/internal/sweep.hpp>
 

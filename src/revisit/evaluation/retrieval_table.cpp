@@ -7,6 +7,7 @@
 #include <revisit/evaluation/internal/sweep.hpp>
 
 namespace revisit {
+
 RetrievalTable evaluate_retrieval(const std::vector<CandidateRow>& rows, const Reference& reference, RevisitKind kind) {
   std::vector<evaluation_internal::Answer> answers;
   for (const CandidateRow& row : rows) {

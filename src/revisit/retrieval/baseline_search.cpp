@@ -46,10 +46,10 @@ BaselineSearch::Answer BaselineSearch::answer(const Place& query, std::size_t se
   return answer;
 }
 
-double BaselineSearch::similarity_to(FrameId frame) const {
+std::optional<double> BaselineSearch::similarity_to(FrameId frame) const {
   const auto found = std::lower_bound(places_.begin(), places_.end(), frame,
                                       [](const Place& place, FrameId of) { return place.frame.frame < of; });
-  if (found == places_.end() || found->frame.frame != frame) return 0.0;
+  if (found == places_.end() || found->frame.frame != frame) return std::nullopt;
   return method_->similarity(last_, found->signature);
 }
 

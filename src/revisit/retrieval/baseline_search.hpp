@@ -30,8 +30,8 @@ class BaselineSearch {
   };
   std::optional<Answer> process(const FrameTime& query, std::span<const Point> points, double ground_z_m);
 
-  /// How like the place of an earlier frame the last scan was; 0 where that frame is no place.
-  double similarity_to(FrameId frame) const;
+  /// How like the place of an earlier frame the last scan is; nothing where that frame is no place.
+  std::optional<double> similarity_to(FrameId frame) const;
 
   const Baseline& method() const { return *method_; }
   /// What the method keeps, in the mean.

@@ -69,6 +69,7 @@ std::vector<ImuSample> SimulatedRecording::imu(double stamp_s, double from_s, do
 }
 
 Image SimulatedRecording::image(std::size_t index, ImageLight light) const {
+  if (index >= size()) throw std::out_of_range("image " + std::to_string(index) + " of " + std::to_string(size()));
   std::call_once(parts_->has_camera,
                  [this] { parts_->camera = std::make_unique<simulation_internal::Camera>(parts_->world); });
   Pose T_local_lidar = parts_->scanner->T_world_lidar(stamp_s(index));

@@ -60,8 +60,9 @@ Eigen::MatrixXf make_wavelets() {
   return gain;
 }
 
-class LidarIris final : public Baseline {
+class LidarIris final : public TurnMethod {
  public:
+  LidarIris() : TurnMethod(kAzimuths) {}
   std::string name() const override { return "lidar-iris"; }
   std::string source() const override { return "Wang, Sun et al., IROS 2020"; }
 
@@ -81,16 +82,8 @@ class LidarIris final : public Baseline {
     return signature;
   }
 
-  Gives gives() const override { return Gives::kYaw; }
-  double similarity(const Signature& query, const Signature& place) const override {
-    return best_turn(query, place).similarity;
-  }
-  Pose T_place_query(const Signature& query, const Signature& place) const override {
-    return best_turn(query, place).T_place_query(kAzimuths);
-  }
-
  private:
-  static Turn best_turn(const Signature& query, const Signature& place) {
+  Turn best_turn(const Signature& query, const Signature& place) const override {
     Eigen::Index turn = 0;  // column j of the query lies on column j + turn of the place
     circular_correlation(query.values, place.values, kAzimuths).maxCoeff(&turn);
     Turn best;

@@ -29,8 +29,9 @@ std::array<std::uint32_t, kSectors> cells_that_hold(float value, const Eigen::Ma
   return masks;
 }
 
-class PublishedIsc final : public Baseline {
+class PublishedIsc final : public TurnMethod {
  public:
+  PublishedIsc() : TurnMethod(kSectors) {}
   std::string name() const override { return "isc-program"; }
   std::string source() const override { return "Wang et al., ICRA 2020, as in the published program"; }
 
@@ -47,16 +48,8 @@ class PublishedIsc final : public Baseline {
     return {std::move(image), {}};
   }
 
-  Gives gives() const override { return Gives::kYaw; }
-  double similarity(const Signature& query, const Signature& place) const override {
-    return best_turn(query, place).similarity;
-  }
-  Pose T_place_query(const Signature& query, const Signature& place) const override {
-    return best_turn(query, place).T_place_query(kSectors);
-  }
-
  private:
-  static Turn best_turn(const Signature& query_signature, const Signature& place_signature) {
+  Turn best_turn(const Signature& query_signature, const Signature& place_signature) const override {
     const Eigen::MatrixXf &query = query_signature.values, &place = place_signature.values;
     const auto empty_q = cells_that_hold(0.f, query), empty_p = cells_that_hold(0.f, place);
     const auto one_q = cells_that_hold(1.f, query), one_p = cells_that_hold(1.f, place);

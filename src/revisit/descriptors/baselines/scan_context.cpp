@@ -18,9 +18,9 @@ constexpr int kRings = 20, kSectors = 60;
 constexpr float kMaxRange_m = 80.f;
 constexpr float kBelowGround_m = 0.27f;  // the program adds 2 m to the heights of a sensor 1.73 m above the ground
 
-class ScanContext final : public Baseline {
+class ScanContext final : public TurnMethod {
  public:
-  explicit ScanContext(std::size_t nearest_ring_keys) : nearest_ring_keys_(nearest_ring_keys) {}
+  explicit ScanContext(std::size_t nearest_ring_keys) : TurnMethod(kSectors), nearest_ring_keys_(nearest_ring_keys) {}
 
   std::string name() const override { return nearest_ring_keys_ == 0 ? "scan-context" : "scan-context-ring-key"; }
   std::string source() const override {
@@ -32,14 +32,6 @@ class ScanContext final : public Baseline {
     return {polar_heights(points, ground_z_m), {}};
   }
 
-  Gives gives() const override { return Gives::kYaw; }
-  double similarity(const Signature& query, const Signature& place) const override {
-    return best_turn(query, place).similarity;
-  }
-  Pose T_place_query(const Signature& query, const Signature& place) const override {
-    return best_turn(query, place).T_place_query(kSectors);
-  }
-
   Eigen::VectorXf key(const Signature& signature) const override {
     if (nearest_ring_keys_ == 0) return {};
     return signature.values.rowwise().mean();
@@ -47,7 +39,7 @@ class ScanContext final : public Baseline {
   std::size_t nearest_keys() const override { return nearest_ring_keys_; }
 
  private:
-  static Turn best_turn(const Signature& query, const Signature& place) {
+  Turn best_turn(const Signature& query, const Signature& place) const override {
     // Columns of unit length, so that a cosine is one product; empty columns stay zero.
     const Eigen::VectorXf query_scale = inverse_lengths(query.values), place_scale = inverse_lengths(place.values);
     const Eigen::Matrix<float, kSectors, kSectors> cosines =

@@ -16,7 +16,8 @@ namespace {
 
 constexpr float kLane_m = 2.f;
 constexpr std::array kLeft_m{0.f, kLane_m, -kLane_m};
-constexpr Eigen::Index kReach = 3;  // sectors of 60, to both sides
+constexpr Eigen::Index kSectors = 60;  // of polar_heights()
+constexpr Eigen::Index kReach = 3;     // of them, to both sides
 
 // By how many columns `place` is turned against `query`: where the means of their columns differ least (L1).
 Eigen::Index shift_of(const Eigen::VectorXf& query, const Eigen::VectorXf& place) {
@@ -45,8 +46,9 @@ double mean_cosine(const Eigen::MatrixXf& query, const Eigen::VectorXf& query_sc
   return columns > 0 ? sum / columns : 0.0;
 }
 
-class ScanContextPlusPlus final : public Baseline {
+class ScanContextPlusPlus final : public TurnMethod {
  public:
+  ScanContextPlusPlus() : TurnMethod(kSectors) {}
   std::string name() const override { return "scan-context++"; }
   std::string source() const override { return "Kim, Choi and Kim, T-RO 2022; augmented polar context"; }
 
@@ -64,16 +66,8 @@ class ScanContextPlusPlus final : public Baseline {
     return {signature.values.leftCols(signature.values.cols() / static_cast<Eigen::Index>(kLeft_m.size())), {}};
   }
 
-  Gives gives() const override { return Gives::kYaw; }
-  double similarity(const Signature& query, const Signature& place) const override {
-    return best_turn(query, place).similarity;
-  }
-  Pose T_place_query(const Signature& query, const Signature& place) const override {
-    return best_turn(query, place).T_place_query(query.values.cols() / static_cast<Eigen::Index>(kLeft_m.size()));
-  }
-
  private:
-  static Turn best_turn(const Signature& query, const Signature& place) {
+  Turn best_turn(const Signature& query, const Signature& place) const override {
     const Eigen::Index sectors = query.values.cols() / static_cast<Eigen::Index>(kLeft_m.size());
     const Eigen::MatrixXf own = place.values.leftCols(sectors);
     const Eigen::VectorXf own_key = own.colwise().mean(), own_scale = inverse_lengths(own);

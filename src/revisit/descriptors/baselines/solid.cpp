@@ -73,15 +73,15 @@ class Solid final : public Baseline {
   }
 
   Pose T_place_query(const Signature& query, const Signature& place) const override {
-    Turn best;
+    Eigen::Index best = 0;
     float least = std::numeric_limits<float>::infinity();
     for (Eigen::Index shift = 0; shift < kAzimuths; ++shift) {
       const Eigen::Index rest = kAzimuths - shift;
       const float difference = (query.more.topRows(rest) - place.more.bottomRows(rest)).lpNorm<1>() +
                                (query.more.bottomRows(shift) - place.more.topRows(shift)).lpNorm<1>();
-      if (difference < least) least = difference, best.columns = shift;
+      if (difference < least) least = difference, best = shift;
     }
-    return best.T_place_query(kAzimuths);
+    return pose_of_turn(best, kAzimuths);
   }
 };
 

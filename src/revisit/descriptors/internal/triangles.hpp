@@ -25,10 +25,11 @@ struct TriangleOptions {
   float longest_m;         ///< side
 };
 
-/// What is common to the methods that know a place by triangles of keypoints, which do not change however the sensor
-/// stands: triangles of sides that agree within a hundredth (and whose corners have like normals or codes) vote for
-/// places; of the 50 with the most votes each triangle gives a pose; the pose that brings most triangles together
-/// counts, by the share of the query's upright flat pieces that lie on such pieces of the place then.
+/// What STD and BTC have in common: a place is known by triangles between its keypoints, whose sides are the same
+/// wherever the sensor stands. A triangle of the query votes for each place that has one like it: sides within a
+/// hundredth, corners with like normals and codes. The 50 places with the most votes are compared: each pair of like
+/// triangles gives a pose; the pose under which most pairs coincide is refined, and its score is the share of the
+/// query's upright flat pieces that then lie on upright flat pieces of the place.
 /// Signature: `values`: a triangle a column, three sides, shortest first, the keypoints opposite of them, and the
 /// cosines between the normals of these, in the order of the longest side; `more`: position and normal of the
 /// keypoints, then of flat pieces; `bits`: the codes.
