@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -48,6 +49,8 @@ class Baseline {
   virtual Gives gives() const { return Gives::kPlace; }
   /// How many scans are described together, in the frame of the last one; more than one are laid together by odometry.
   virtual std::size_t scans() const { return 1; }
+  /// Only each how-many-th scan is a place: those that are described many together hardly differ from one to the next.
+  virtual std::size_t place_every() const { return 1; }
 
   /// `points`: of that many scans, finite, metres, LiDAR frame, intensity in [0, 1]; `ground_z_m`: where the ground
   /// lies in that frame.
@@ -58,6 +61,8 @@ class Baseline {
 
   /// How alike two places are; larger is more alike, the scale is the method's own.
   virtual double similarity(const Signature& query, const Signature& place) const = 0;
+  /// The similarity of two that have nothing in common at all: no answer.
+  virtual double least_similarity() const { return -std::numeric_limits<double>::infinity(); }
 
   /// Where the query stands in the frame of the place, as far as gives() says; what is not given is 0.
   virtual Pose T_place_query(const Signature& /*query*/, const Signature& /*place*/) const { return Pose::Identity(); }

@@ -11,18 +11,22 @@
 namespace revisit {
 
 std::vector<std::size_t> BaselineSearch::shortlist(const Place& query, std::size_t searchable) const {
-  if (index_) return index_->look_up(query.signature, searchable);
-  std::vector<std::size_t> all(searchable);
-  std::iota(all.begin(), all.end(), std::size_t{0});
-  const std::size_t wanted = method_->nearest_keys();
-  if (wanted == 0 || searchable <= wanted) return all;
+  const std::size_t every = method_->place_every(), places = (searchable + every - 1) / every;
+  std::vector<std::size_t> chosen;
+  if (index_)
+    chosen = index_->look_up(query.signature, places);
+  else
+    chosen.resize(places), std::iota(chosen.begin(), chosen.end(), std::size_t{0});
+  for (std::size_t& place : chosen) place *= every;
+  const std::size_t wanted = index_ ? 0 : method_->nearest_keys();
+  if (wanted == 0 || places <= wanted) return chosen;
   std::vector<float> distance(searchable);
-  for (std::size_t i = 0; i < searchable; ++i) distance[i] = (places_[i].key - query.key).squaredNorm();
+  for (const std::size_t i : chosen) distance[i] = (places_[i].key - query.key).squaredNorm();
   std::partial_sort(
-      all.begin(), all.begin() + static_cast<std::ptrdiff_t>(wanted), all.end(),
+      chosen.begin(), chosen.begin() + static_cast<std::ptrdiff_t>(wanted), chosen.end(),
       [&](std::size_t a, std::size_t b) { return distance[a] != distance[b] ? distance[a] < distance[b] : a < b; });
-  all.resize(wanted);
-  return all;
+  chosen.resize(wanted);
+  return chosen;
 }
 
 BaselineSearch::Answer BaselineSearch::answer(const Place& query, std::size_t searchable) const {
@@ -34,7 +38,7 @@ BaselineSearch::Answer BaselineSearch::answer(const Place& query, std::size_t se
   const auto best = std::max_element(similarity.begin(), similarity.end());
   Answer answer;
   answer.row.query = query.frame.frame;
-  if (best == similarity.end() || (index_ && *best <= 0.0)) {
+  if (best == similarity.end() || !(*best > method_->least_similarity())) {
     answer.row.reason = to_text(Refusal{Refusal::Reason::kNoCandidate});
     return answer;
   }
@@ -69,7 +73,7 @@ std::optional<BaselineSearch::Answer> BaselineSearch::process(const FrameTime& q
   query.signature = method_->kept(std::move(query.signature));
   bytes_ += query.signature.bytes() + static_cast<std::size_t>(query.key.size()) * sizeof(float);
   places_.push_back(std::move(query));
-  if (index_) index_->add(places_.back().signature);
+  if (index_ && (places_.size() - 1) % method_->place_every() == 0) index_->add(places_.back().signature);
   return found;
 }
 

@@ -15,7 +15,7 @@
 namespace revisit {
 
 /// Places by a published descriptor: answers each scan with the place most like it, however little that is (but
-/// with none where an index of its own finds none whose similarity is above 0), and adds the scan. Frames increase.
+/// with none where all have nothing in common with it), and adds the scan. Frames increase.
 /// Belongs to one thread at a time.
 class BaselineSearch {
  public:

@@ -18,7 +18,7 @@
 namespace revisit {
 namespace {
 
-constexpr std::size_t kScans = 50, kEach = 10, kFewestInliers = 6;
+constexpr std::size_t kScans = 50, kPlaceEvery = 10, kFewestInliers = 6;
 constexpr int kCells = 320, kMostDifferent = 50, kTries = 200;
 constexpr float kCell_m = 0.5f, kReach_m = kCells * kCell_m / 2.f, kFaintest = 0.05f, kSame_m = 3.f * kCell_m;
 constexpr FeatureOptions kDensityFeatures{300, 1, 35};
@@ -45,6 +45,8 @@ class DensityMap final : public Baseline {
   std::string source() const override { return "Gupta et al., ICRA 2024; of the last fifty scans"; }
   Gives gives() const override { return Gives::kPlanarPose; }
   std::size_t scans() const override { return kScans; }
+  std::size_t place_every() const override { return kPlaceEvery; }
+  double least_similarity() const override { return 0.0; }
 
   // `values`: where the features are, in metres; `bits`: four words each.
   Signature describe(std::span<const Point> points, double) const override {
@@ -65,19 +67,6 @@ class DensityMap final : public Baseline {
   }
   Pose T_place_query(const Signature& query, const Signature& place) const override {
     return align(query, place).T_place_query;
-  }
-  std::unique_ptr<BaselineIndex> make_index() const override {
-    class EachTenth final : public BaselineIndex {
-     public:
-      void add(const Signature&) override {}
-      std::vector<std::size_t> look_up(const Signature&, std::size_t searchable) const override {
-        std::vector<std::size_t> places;
-        for (std::size_t i = 0; i < searchable; i += kEach) places.push_back(i);
-        return places;
-      }
-      std::size_t bytes() const override { return 0; }
-    };
-    return std::make_unique<EachTenth>();
   }
 
  private:

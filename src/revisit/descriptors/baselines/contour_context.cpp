@@ -138,6 +138,7 @@ class ContourContext final : public Baseline {
     return signature;
   }
 
+  double least_similarity() const override { return 0.0; }
   double similarity(const Signature& query, const Signature& place) const override {
     const auto found = align(query, place);
     return found ? found->correlation : 0.0;

@@ -20,7 +20,7 @@
 namespace revisit::descriptors_internal {
 namespace {
 
-constexpr std::size_t kScans = 10, kLandmarks = 60;
+constexpr std::size_t kScans = 10, kPlaceEvery = 5, kLandmarks = 60;
 constexpr int kRings = 4, kSectors = 16, kLayers = 4;
 constexpr float kRadius_m = 12.f, kLayer_m = 2.f, kVoxel_m = 0.5f, kColumn_m = 1.f, kReach_m = 40.f,
                 kAboveGround_m = 0.3f;
@@ -122,6 +122,7 @@ class LandmarkDensity final : public Baseline {
   std::string name() const override { return "nbld"; }
   std::string source() const override { return "Cieslewski et al., ICRA 2016; of the last ten scans"; }
   std::size_t scans() const override { return kScans; }
+  std::size_t place_every() const override { return kPlaceEvery; }
 
   // `bits`: a descriptor after the other.
   Signature describe(std::span<const Point> points, double ground_z_m) const override {

@@ -36,11 +36,13 @@ struct TriangleOptions {
 Baseline::Signature triangle_signature(const std::vector<TriangleKeypoint>& keypoints,
                                        std::span<const SurfaceVoxel> voxels, const TriangleOptions& options);
 
-/// A method whose signatures these are, of the last ten scans.
+/// A method whose signatures these are, of the last ten scans; each fifth is a place (in the papers: each tenth).
 class TriangleMethod : public Baseline {
  public:
   Gives gives() const override { return Gives::kPose; }
   std::size_t scans() const override { return 10; }
+  std::size_t place_every() const override { return 5; }
+  double least_similarity() const override { return 0.0; }
   double similarity(const Signature& query, const Signature& place) const override;
   Pose T_place_query(const Signature& query, const Signature& place) const override;
   std::unique_ptr<BaselineIndex> make_index() const override;
