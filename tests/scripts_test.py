@@ -113,16 +113,29 @@ class Scripts(unittest.TestCase):
                     (f"{round(stamp * 1e9)} ", "\n"))
             write(folder / name / "LiDAR_GT" / "Ouster_gt.txt", text)
 
+        def pcd(scan):
+            count = len(scan) // 16
+            return (f"VERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\n"
+                    f"WIDTH {count}\nHEIGHT 1\nPOINTS {count}\nDATA binary\n").encode() + scan
+
+        def newer_college(folder):
+            T_base_lidar = of.from_quaternion(-0.084, -0.025, 0.050, 0, 0, 0.924, 0.383)
+            text = "#sec,nsec,x,y,z,qx,qy,qz,qw\n"
+            for stamp, scan, T in zip(stamps, scans, truth):
+                sec, nsec = divmod(round(stamp * 1e9), 10**9)
+                write(folder / name / "raw_format" / "ouster_scan" / f"cloud_{sec}_{nsec}.pcd", pcd(scan))
+                base = of.product(T, of.inverse(T_base_lidar))
+                text += ",".join(f"{word:.12g}" for word in [sec, nsec, *at(base), *of.to_quaternion(base)]) + "\n"
+            write(folder / name / "ground_truth" / "registered_poses.csv", text)
+
         def apollo(folder):
             text = ""
-            for i, (stamp, scan, T) in enumerate(zip(stamps, points, truth), 1):
-                head = (f"VERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\n"
-                        f"WIDTH {len(scan)}\nHEIGHT 1\nPOINTS {len(scan)}\nDATA binary\n")
-                write(folder / name / "pcds" / f"{i}.pcd", head.encode() + scans[i - 1])
+            for i, (stamp, scan, T) in enumerate(zip(stamps, scans, truth), 1):
+                write(folder / name / "pcds" / f"{i}.pcd", pcd(scan))
                 text += f"{i} {stamp:.6f} " + " ".join(f"{word:.12g}" for word in [*at(T), *of.to_quaternion(T)]) + "\n"
             write(folder / name / "poses" / "gt_poses.txt", text)
 
-        for make in (kitti360, mulran, nclt, helipr, apollo):
+        for make in (kitti360, mulran, nclt, helipr, newer_college, apollo):
             with self.subTest(make.__name__):
                 data, out = self.folder / make.__name__, self.folder / f"{make.__name__}_out"
                 command = (SCRIPTS / "datasets" / "run.py", make.__name__, data, out, name, "--methods",

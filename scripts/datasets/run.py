@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""KITTI-360, MulRan, NCLT, HeLiPR and Apollo-SouthBay, from what was downloaded to the tables of docs/evaluation.md: says
+"""KITTI-360, MulRan, NCLT, HeLiPR, Newer College and Apollo-SouthBay, from what was downloaded to the tables of docs/evaluation.md: says
 what is missing, lays scans, times and poses of the LiDAR out as `revisit` reads them (scans as links where it can), runs
 every method (`revisit compare --verify`) and SLAM, and puts the tables into OUT/tables.txt. KITTI odometry: kitti.sh.
 
@@ -13,6 +13,8 @@ mulran    SEQUENCE/sensor_data/Ouster/*.bin (or SEQUENCE/Ouster), SEQUENCE/globa
 nclt      velodyne_data/SEQUENCE/velodyne_sync/*.bin (or SEQUENCE/velodyne_sync),
           ground_truth/groundtruth_SEQUENCE.csv (or groundtruth_SEQUENCE.csv)            (SEQUENCE: 2012-01-08)
 helipr    SEQUENCE/LiDAR/Ouster/*.bin, SEQUENCE/LiDAR_GT/Ouster_gt.txt
+newer_college  SEQUENCE/raw_format/ouster_scan/cloud_SECONDS_NANOSECONDS.pcd (or SEQUENCE/ouster_scan),
+          SEQUENCE/ground_truth/registered_poses.csv    (the OS1-64 of 2020; SEQUENCE: 01_short_experiment)
 apollo    SEQUENCE/pcds/*.pcd, SEQUENCE/poses/gt_poses.txt (index, time, x y z, qx qy qz qw; taken as the LiDAR's)
 A sequence takes some minutes to hours on two cores. What is there already is not run again."""
 import argparse
@@ -169,6 +171,20 @@ def helipr(folder, sequence):
     return [(int(scan.stem) * 1e-9, scan) for scan in scans], poses, of_helipr
 
 
+def newer_college(folder, sequence):
+    base = folder / sequence
+    scans = scans_of(need(base / "raw_format" / "ouster_scan", base / "ouster_scan"), "pcd")
+    # Its poses are those of the base, into which the LiDAR was calibrated: turned by 135 degrees.
+    T_base_lidar = from_quaternion(-0.084, -0.025, 0.050, 0, 0, 0.924, 0.383)
+    poses = [(row[0] + row[1] * 1e-9, product(from_quaternion(*row[2:9]), T_base_lidar))
+             for row in rows(need(base / "ground_truth" / "registered_poses.csv"))]
+    stamped = []
+    for scan in scans:
+        seconds, nanoseconds = scan.stem.split("_")[1:3]
+        stamped.append((int(seconds) + int(nanoseconds) * 1e-9, scan))
+    return sorted(stamped), poses, None
+
+
 def apollo(folder, sequence):
     scans = scans_of(need(folder / sequence / "pcds"), "pcd")
     stamps, poses = {}, []
@@ -209,7 +225,7 @@ def run(*command):
 
 
 def main():
-    datasets = {each.__name__: each for each in (kitti360, mulran, nclt, helipr, apollo)}
+    datasets = {each.__name__: each for each in (kitti360, mulran, nclt, helipr, newer_college, apollo)}
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("dataset", choices=datasets)
     parser.add_argument("folder", type=pathlib.Path)
