@@ -10,6 +10,7 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <revisit/core/refusal_text.hpp>
+#include <revisit/descriptors/baseline_plugin.hpp>
 #include <revisit/descriptors/similarity.hpp>
 #include <revisit/vision/density_map.hpp>
 
@@ -91,30 +92,47 @@ Method& Methods::add(const std::string& name, const std::string& source) {
   return method;
 }
 
-Methods::Methods(const Options& options, const Parameters& parameters, const IntensityScale& scale)
+bool Methods::Options::wants(const std::string& name) const {
+  return wanted.empty() || std::find(wanted.begin(), wanted.end(), name) != wanted.end();
+}
+
+Result<std::unique_ptr<Methods>> Methods::make(const Options& options, const Parameters& parameters,
+                                               const IntensityScale& scale) {
+  std::vector<std::unique_ptr<Baseline>> baselines = all_baselines();
+  std::erase_if(baselines, [&](const auto& each) { return !options.wants(each->name()); });
+  std::vector<std::string> taken = names();
+  for (const std::string& vision : vision_names()) taken.push_back(vision);
+  for (const std::string& plugin : options.plugins) {
+    auto loaded = load_baseline(plugin);
+    if (!loaded) return loaded.error();
+    const std::string name = (*loaded)->name();
+    if (std::find(taken.begin(), taken.end(), name) != taken.end()) return Error{plugin + ": " + name + ": is taken"};
+    taken.push_back(name);
+    baselines.push_back(*std::move(loaded));
+  }
+  return std::unique_ptr<Methods>(new Methods(options, parameters, scale, std::move(baselines)));
+}
+
+Methods::Methods(const Options& options, const Parameters& parameters, const IntensityScale& scale,
+                 std::vector<std::unique_ptr<Baseline>> baselines)
     : front_end_(parameters, scale, {}, {}) {
-  const auto is_wanted = [&](const std::string& name) {
-    return options.wanted.empty() ||
-           std::find(options.wanted.begin(), options.wanted.end(), name) != options.wanted.end();
-  };
   const auto places = [&] {
     auto recognition = std::make_unique<PlaceRecognition>(parameters, clouds_in_memory());
     recognition->expect_one_drive();
     return recognition;
   };
-  if (is_wanted(kOurs)) add(kOurs, "this program, with the parameters given").places_ = places();
-  if (is_wanted(kOurRetrieval))
+  if (options.wants(kOurs)) add(kOurs, "this program, with the parameters given").places_ = places();
+  if (options.wants(kOurRetrieval))
     add(kOurRetrieval, "this program's index alone: its first answer, unverified").index_ =
         std::make_unique<PlaceIndex>(parameters.retrieval);
-  if (is_wanted(kPaper)) {
+  if (options.wants(kPaper)) {
     Parameters as_printed = *preset("paper");
     static_cast<ExclusionRule&>(as_printed.retrieval) = parameters.retrieval;
     add(kPaper, "Wang et al., ICRA 2020, as in the paper (preset `paper`)").detector_ =
         std::make_unique<LoopDetector>(as_printed, scale);
   }
   std::size_t most_scans = 0;  // 0: nobody wants more than one
-  for (auto& baseline : all_baselines()) {
-    if (!is_wanted(baseline->name())) continue;
+  for (auto& baseline : baselines) {
     Method& method = add(baseline->name(), baseline->source());
     method.report.gives = baseline->gives();
     method.report.scans = baseline->scans();
@@ -141,7 +159,7 @@ Methods::Methods(const Options& options, const Parameters& parameters, const Int
 
 void Methods::add_vision(const Options& options, const ExclusionRule& exclusion) {
   for (const VisionRow& row : kVision) {
-    if (std::find(options.wanted.begin(), options.wanted.end(), row.name) == options.wanted.end()) continue;
+    if (options.wanted.empty() || !options.wants(row.name)) continue;
     Method& method =
         add(row.name, std::string("Galvez-Lopez and Tardos, T-RO 2012 (DBoW2), of images of a camera, ") + row.light);
     method.words_ = std::make_unique<VisualWords>(options.vocabulary, exclusion);

@@ -80,21 +80,27 @@ class Methods {
  public:
   struct Options {
     std::vector<std::string> wanted;  ///< empty: all
-    bool verifies_all = false;        ///< what baselines answer is registered as this program does
+    bool wants(const std::string& name) const;
+    bool verifies_all = false;  ///< what baselines answer is registered as this program does
     /// Of vision_names(): whose camera they look through, which must outlive this, and their words; null: without them.
     const SimulatedRecording* camera = nullptr;
     std::shared_ptr<const Vocabulary> vocabulary = nullptr;
-    const PairLists* pairs = nullptr;  ///< which the methods score beside their answers; must outlive this
+    const PairLists* pairs = nullptr;       ///< which the methods score beside their answers; must outlive this
+    std::vector<std::string> plugins = {};  ///< methods from shared libraries (load_baseline()), wanted all of them
   };
   static std::vector<std::string> names();
   static std::vector<std::string> vision_names();  ///< only where they are wanted by name
-  Methods(const Options& options, const Parameters& parameters, const IntensityScale& scale);
+  /// An error where a shared library is no method.
+  static Result<std::unique_ptr<Methods>> make(const Options& options, const Parameters& parameters,
+                                               const IntensityScale& scale);
 
   /// Gives the scan, number `index` of the recording, to each, several at once.
   Status answer(const Scan& scan, std::size_t index);
   std::vector<std::unique_ptr<Method>>& all() { return all_; }
 
  private:
+  Methods(const Options& options, const Parameters& parameters, const IntensityScale& scale,
+          std::vector<std::unique_ptr<Baseline>> baselines);
   Method& add(const std::string& name, const std::string& source);
   void add_vision(const Options& options, const ExclusionRule& exclusion);
   Status look(const FrameTime& frame, std::size_t index);

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 struct CompareOptions {
   std::string input, out, poses;
-  std::vector<std::string> methods, candidates;
+  std::vector<std::string> methods, plugins, candidates;
   bool verify = false, pairs = false, overwrite = false;
   InputFlags recording;
   ParameterFlags parameters;
@@ -125,8 +125,11 @@ int compare(const CompareOptions& options) {
   }
   const PairLists pairs = options.pairs ? make_pair_lists((*recording)->trajectory()) : PairLists{};
   if (options.pairs && pairs.empty()) return fail({options.input + ": no two of its frames are of one place (3 m)"});
-  Methods methods({options.methods, options.verify, camera, vocabulary, options.pairs ? &pairs : nullptr}, *parameters,
-                  *scale);
+  const auto made = Methods::make(
+      {options.methods, options.verify, camera, vocabulary, options.pairs ? &pairs : nullptr, options.plugins},
+      *parameters, *scale);
+  if (!made) return fail(made.error());
+  Methods& methods = **made;
   for (const auto& method : methods.all())
     if (const Status status =
             method->open(fs::path(options.out) / method->report.name,
@@ -171,8 +174,9 @@ Run add_compare(CLI::App& program) {
       "loops.csv, failures.csv and a page (report.html). Each method works on one thread, may answer with the\n"
       "same earlier scans, and takes scans that were prepared in the same way (ground, intensity, sweep);\n"
       "isc-paper prepares them by its own preset.\n\n"
-      "Methods of your own: --candidates with the candidates.csv (docs/formats.md) of any program, or\n"
-      "revisit.compare(own=...) in Python.\n\n"
+      "Methods of your own: a shared library (--plugin; examples/method_plugin.c), revisit.compare(own=...) in "
+      "Python,\n"
+      "or --candidates with the candidates.csv (docs/formats.md) of any program.\n\n"
       "Methods:\n"
       "  revisit                this program, with the parameters given; its scores are those after verification\n"
       "  revisit-retrieval      its index alone: the first answer, unverified\n"
@@ -191,6 +195,8 @@ Run add_compare(CLI::App& program) {
   command->add_option("--methods", options->methods, "Only these (separated by commas); default: all")
       ->delimiter(',')
       ->check(CLI::IsMember(known));
+  command->add_option("--plugin", options->plugins,
+                      "Shared library with a method of your own (baseline_plugin.h); it is run. May be repeated");
   command->add_flag("--verify", options->verify,
                     "Register what each method answers as this program does, and judge it by table 2");
   command->add_flag("--pairs", options->pairs,
