@@ -111,6 +111,8 @@ TEST(Cli, DetectAndEvaluateARecordingWithLoops) {
   EXPECT_NE(content(out / "evaluation.json").find("\"false_loops\": 0"), std::string::npos) << evaluate.output;
   for (const char* name : {"precision_recall.png", "trajectory.png", "report.html"})
     EXPECT_GT(fs::file_size(out / name), 1000u) << name;
+  EXPECT_EQ(content(out / "precision_recall.csv").find("score,precision,recall\n"), 0u);
+  EXPECT_NE(content(out / "precision_recall.csv").find(",1.000000,"), std::string::npos) << "the surest is right";
 
   EXPECT_EQ(
       run("evaluate " + out.string() + " --reference " + (recording / "poses.txt").string() + " --exclude-frames -5")

@@ -251,6 +251,7 @@ int evaluate(const EvaluateOptions& options) {
        {draw_precision_recall(folder / "precision_recall.png", report.retrieval, report.reverse_retrieval),
         draw_trajectory(folder / "trajectory.png", reference, report.loops),
         write_kitti_poses(folder / "reference.txt", *trajectory, std::nullopt),
+        write_text(folder / "precision_recall.csv", curve_csv(report.retrieval)),
         write_text(folder / "evaluation.json", to_json(report)), write_text(folder / "report.html", to_html(report))})
     if (!status) return fail(status.error());
   std::cout << "Report: " << (folder / "report.html").string() << '\n';
@@ -266,7 +267,7 @@ Run add_evaluate(CLI::App& program) {
       "Prints table 1 (retrieval), table 2 (loop constraints) and, of `revisit slam`, table 3 (trajectory), or, of "
       "`revisit localise`,\ntable 5 (waking up in a map), of a map table 6 (sessions made one), and "
       "writes\n"
-      "into DIR: report.html, precision_recall.png, trajectory.png, trajectories.png, evaluation.json, and "
+      "into DIR: report.html, precision_recall.png and .csv, trajectory.png, trajectories.png, evaluation.json, and "
       "reference.txt "
       "for `revisit view`. Works on the "
       "files of any program that writes\n"

@@ -76,6 +76,7 @@ Status write_method_page(const std::filesystem::path& folder, const EvaluationRe
       draw_precision_recall(folder / "precision_recall.png", report.retrieval, report.reverse_retrieval),
       is_verified ? draw_trajectory(folder / "trajectory.png", reference, report.loops)
                   : draw_trajectory(folder / "trajectory.png", reference, answers, "answers at the score of F1max"),
+      write_text(folder / "precision_recall.csv", curve_csv(report.retrieval)),
       write_text(folder / "failures.csv", failures_csv(answers, reference)),
       write_text(folder / "report.html", to_html(report))};
   for (const Status& status : written)

@@ -122,6 +122,13 @@ std::string to_json(const EvaluationReport& report) {
   return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
+std::string curve_csv(const RetrievalTable& table) {
+  std::string text = "score,precision,recall\n";
+  for (const PrecisionRecall& point : table.curve)
+    text += format("%.9g,%.6f,%.6f\n", point.score, point.precision, point.recall);
+  return text;
+}
+
 std::string to_html(const EvaluationReport& report) {
   return "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>revisit: loop closures</title>\n"
          "<style>body{font-family:sans-serif;max-width:1000px;margin:2em auto}table{border-collapse:collapse}"

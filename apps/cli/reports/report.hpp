@@ -26,6 +26,8 @@ struct EvaluationReport {
 
 std::string to_text(const EvaluationReport& report);
 std::string to_json(const EvaluationReport& report);
+/// Precision over recall, a row a score.
+std::string curve_csv(const RetrievalTable& table);
 /// Table 5; `keyframes` are those of the map.
 std::string to_text(const WakingTable& table, std::size_t keyframes);
 std::string to_json(const WakingTable& table, std::size_t keyframes);
