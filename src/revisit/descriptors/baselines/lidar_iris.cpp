@@ -6,13 +6,13 @@
 // transform and compared by Hamming distance where both responses are not nothing. Heights are metres from half a metre
 // below the ground here (in the authors' program: elevations of one sensor).
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <complex>
 #include <vector>
 
 #include <unsupported/Eigen/FFT>
 
+#include <revisit/bits/occupancy_bits.h>
 #include <revisit/core/pose.hpp>
 #include <revisit/descriptors/internal/baselines.hpp>
 #include <revisit/descriptors/internal/circular_correlation.hpp>
@@ -24,7 +24,7 @@ constexpr int kRanges = 80, kAzimuths = 360, kHeights = 8, kScales = 4, kFrequen
 constexpr double kShortestWave = 18.0, kWaveRatio = 1.6, kSigmaOverF = 0.75;
 constexpr float kLeastResponse = 1e-4f, kBelowGround_m = 0.5f;
 constexpr int kReach = 2;  // columns beside the turn of the Fourier transform that are tried
-constexpr std::size_t kWordsOfColumn = std::size_t{kRanges} * kScales * 2 / 64;  // its signs; its mask has as many
+constexpr std::size_t kWordsOfColumn = std::size_t{kRanges} * kScales * 2 / 64, kWords = kWordsOfColumn * kAzimuths;
 
 using Complex = std::complex<float>;
 
@@ -66,10 +66,10 @@ class LidarIris final : public TurnMethod {
   std::string name() const override { return "lidar-iris"; }
   std::string source() const override { return "Wang, Sun et al., IROS 2020"; }
 
-  // `values`: the spectra of the rows; `bits`: signs and mask, a column after the other.
+  // `values`: the spectra of the rows; `bits`: the signs, a column after the other, then the masks.
   Signature describe(std::span<const Point> points, double ground_z_m) const override {
     const Eigen::MatrixXf image = image_of(points, static_cast<float>(ground_z_m));
-    Signature signature{spectra_of_rows(image), std::vector<std::uint64_t>(2 * kWordsOfColumn * kAzimuths)};
+    Signature signature{spectra_of_rows(image), std::vector<std::uint64_t>(2 * kWords)};
     std::vector<Complex> passed(kAzimuths), response;
     for (Eigen::Index range = 0; range < kRanges; ++range)
       for (Eigen::Index scale = 0; scale < kScales; ++scale) {
@@ -100,27 +100,21 @@ class LidarIris final : public TurnMethod {
     for (std::size_t column = 0; column < kAzimuths; ++column) {
       if (std::abs(response[column]) < kLeastResponse) continue;
       const std::uint64_t signs = (response[column].real() > 0.f ? 1u : 0u) | (response[column].imag() > 0.f ? 2u : 0u);
-      std::uint64_t* const words = bits.data() + column * 2 * kWordsOfColumn;
-      words[first / 64] |= signs << (first % 64);
-      words[kWordsOfColumn + first / 64] |= std::uint64_t{3} << (first % 64);
+      const std::size_t word = column * kWordsOfColumn + first / 64;
+      bits[word] |= signs << (first % 64);
+      bits[kWords + word] |= std::uint64_t{3} << (first % 64);
     }
   }
 
-  // The share of the bits that both have which agree.
+  // The share of the bits that both have which agree. A sign is set only where the mask is.
   static double alike(const std::vector<std::uint64_t>& query, const std::vector<std::uint64_t>& place, int turn) {
-    std::size_t both = 0, different = 0;
-    const auto first_columns = static_cast<std::size_t>(kAzimuths - turn);
-    const auto count = [&](const std::uint64_t* q, const std::uint64_t* p, std::size_t columns) {
-      for (std::size_t c = 0; c < columns; ++c, q += 2 * kWordsOfColumn, p += 2 * kWordsOfColumn)
-        for (std::size_t w = 0; w < kWordsOfColumn; ++w) {
-          const std::uint64_t mask = q[kWordsOfColumn + w] & p[kWordsOfColumn + w];
-          both += static_cast<std::size_t>(std::popcount(mask));
-          different += static_cast<std::size_t>(std::popcount((q[w] ^ p[w]) & mask));
-        }
+    const std::size_t turned = static_cast<std::size_t>(turn) * kWordsOfColumn;
+    const auto common = [&](const std::uint64_t* q, const std::uint64_t* p) {
+      return revisit_bits_common(q, p + turned, kWords - turned) + revisit_bits_common(q + kWords - turned, p, turned);
     };
-    const std::size_t stride = 2 * kWordsOfColumn;
-    count(query.data(), place.data() + static_cast<std::size_t>(turn) * stride, first_columns);
-    count(query.data() + first_columns * stride, place.data(), static_cast<std::size_t>(turn));
+    const std::uint64_t *q = query.data(), *p = place.data(), *q_mask = q + kWords, *p_mask = p + kWords;
+    const std::uint64_t both = common(q_mask, p_mask);
+    const std::uint64_t different = common(q, p_mask) + common(q_mask, p) - 2 * common(q, p);
     return both == 0 ? 0.0 : 1.0 - static_cast<double>(different) / static_cast<double>(both);
   }
 
