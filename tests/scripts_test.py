@@ -162,6 +162,22 @@ class Scripts(unittest.TestCase):
                 ate_m = next(float(line.split()[-6]) for line in table if " m " in line and "frames" not in line)
                 self.assertLess(ate_m, 0.1)
 
+    def test_the_papers_table_stands_beside_ours(self):
+        drive = self.folder / "compared" / "05-hdl64e-1"
+        (drive / "scan-context").mkdir(parents=True)
+        (drive / "scan-context" / "precision_recall.csv").write_text(
+            "score,precision,recall\n0.9,1.000000,0.400000\n0.8,1.000000,0.610000\n0.7,0.950000,0.900000\n")
+        (drive / "comparison.json").write_text(
+            '{"revisit": {"table_2": {"accepted": 9, "precision": 1.0, "recall": 0.995}}, "isc-paper": {"table_2": '
+            '{"accepted": 0, "precision": 0.0, "recall": 0.0}}}')
+        done = run(SCRIPTS / "paper.py", self.folder / "compared")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("| 05-hdl64e-1 | Scan Context | 100, 90 | scan-context | 61 |", done.stdout)
+        self.assertIn("| 05-hdl64e-1 | NBLD | 93, 60 | nbld | - |", done.stdout)
+        self.assertIn("| this program | 100, 99.5 |", done.stdout)
+        self.assertIn("| no loop, 0 |", done.stdout)
+        self.assertIn("holds no folder", run(SCRIPTS / "paper.py", self.folder).stderr)
+
     def test_methods_are_ranked_over_runs(self):
         folders = []
         for i, (a, b) in enumerate([(0.9, 0.5), (0.8, 0.85), (0.95, 0.4), (0.9, 0.6)]):
