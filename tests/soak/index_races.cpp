@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A place index of so many places, to which one thread adds while four search it: index_races PLACES SECONDS
-// (scripts/index_races.sh runs it under ThreadSanitizer). Each query is one of the places, turned: its own place must be
-// the answer, and a search of places that were there at its beginning must see those alone.
+// (scripts/index_races.sh runs it under ThreadSanitizer). Each query is one of the places, turned: its own place must
+// be the answer, and a search of places that were there at its beginning must see those alone.
 #include <atomic>
 #include <chrono>
 #include <cstdio>
