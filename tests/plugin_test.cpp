@@ -98,7 +98,7 @@ TEST(Plugin, CompareScoresItBesideTheOthers) {
 
   const auto twice = compare(" --plugin " + example_plugin().string() + " --plugin " + example_plugin().string());
   EXPECT_EQ(twice.code, 1);
-  EXPECT_NE(twice.output.find("ranges-and-heights: is taken"), std::string::npos) << twice.output;
+  EXPECT_NE(twice.output.find("its name, ranges-and-heights, is taken"), std::string::npos) << twice.output;
   const auto absent = compare(" --plugin none.so");
   EXPECT_EQ(absent.code, 1);
   EXPECT_NE(absent.output.find("none.so: is no shared library"), std::string::npos) << absent.output;

@@ -10,6 +10,7 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <revisit/core/refusal_text.hpp>
+#include <revisit/core/text.hpp>
 #include <revisit/descriptors/baseline_plugin.hpp>
 #include <revisit/descriptors/similarity.hpp>
 #include <revisit/vision/density_map.hpp>
@@ -106,7 +107,8 @@ Result<std::unique_ptr<Methods>> Methods::make(const Options& options, const Par
     auto loaded = load_baseline(plugin);
     if (!loaded) return loaded.error();
     const std::string name = (*loaded)->name();
-    if (std::find(taken.begin(), taken.end(), name) != taken.end()) return Error{plugin + ": " + name + ": is taken"};
+    if (std::find(taken.begin(), taken.end(), name) != taken.end())
+      return Error{format("%s: its name, %s, is taken", plugin.c_str(), name.c_str())};
     taken.push_back(name);
     baselines.push_back(*std::move(loaded));
   }
