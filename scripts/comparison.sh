@@ -2,7 +2,8 @@
 # All methods side by side over simulated drives (docs/comparison.md), each verified by this program's registration too.
 # usage: scripts/comparison.sh POSES_FOLDER OUT [SEED] [DRIVE-SENSOR-DIFFICULTY ...]
 # POSES_FOLDER holds kitti_NN.txt. Drives: 00, 02, ... or warehouse, building; 07-hdl64e-1, say. Choose nothing on the
-# seeds that figures are reported for. FRAMES=N drives only the first N scans.
+# seeds that figures are reported for. FRAMES=N drives only the first N scans; OPTIONS are those of `revisit compare` instead
+# of --verify ("" for retrieval alone, which takes half as long).
 set -euo pipefail
 program=$(realpath -m "${REVISIT:-$(dirname "$0")/../build/revisit}")
 usage="usage: scripts/comparison.sh POSES_FOLDER OUT [SEED] [DRIVE-SENSOR-DIFFICULTY ...]"
@@ -24,6 +25,7 @@ for run in "$@"; do
   esac
   [ -z "${FRAMES:-}" ] || printf 'frames = %s\n' "$FRAMES" >> "$spec"
   echo "== $run, seed $seed"
-  "$program" compare "$spec" --verify --out "$out/$run" --overwrite > "$out/$run.txt" || [ $? = 3 ]  # but for some scans
+  # shellcheck disable=SC2086  # several words
+  "$program" compare "$spec" ${OPTIONS---verify} --out "$out/$run" --overwrite > "$out/$run.txt" || [ $? = 3 ]  # but for some scans
   cat "$out/$run.txt"
 done
