@@ -6,7 +6,7 @@
 #   sequences/NN/velodyne/NNNNNN.bin   data_odometry_velodyne.zip, 80 GB
 #   sequences/NN/calib.txt times.txt   data_odometry_calib.zip
 #   poses/NN.txt                       data_odometry_poses.zip, 00 to 10
-# A sequence takes some minutes to half an hour on two cores. What is there already is not run again.
+# A sequence takes some minutes to half an hour on two cores. What is there already is not run again. METHODS=a,b: only these.
 set -euo pipefail
 usage="usage: scripts/datasets/kitti.sh FOLDER OUT [SEQUENCE ...]"
 folder=$(realpath "${1:?$usage}")
@@ -28,7 +28,7 @@ for sequence in "$@"; do
   for file in calib.txt times.txt; do [ -s "$of/$file" ] || lacks "$of/$file" data_odometry_calib.zip; done
   [ -s "$folder/poses/$sequence.txt" ] || lacks "$folder/poses/$sequence.txt" data_odometry_poses.zip
   found=0
-  [ ! -d "$of/velodyne" ] || found=$(find "$of/velodyne" -name '*.bin' -size +0 | wc -l)
+  [ ! -d "$of/velodyne" ] || found=$(find -L "$of/velodyne" -name '*.bin' -size +0 | wc -l)
   if [ "$found" = 0 ]; then
     lacks "$of/velodyne/*.bin" data_odometry_velodyne.zip
   elif [ "$found" != "${scans[$sequence]}" ]; then
@@ -42,11 +42,12 @@ run() { "$@" > /dev/null || [ $? = 3 ]; }
 mkdir -p "$out"
 for sequence in "$@"; do
   of=$folder/sequences/$sequence poses=$folder/poses/$sequence.txt to=$out/$sequence
-  found=$(find "$of/velodyne" -name '*.bin' -size +0 | wc -l)
+  found=$(find -L "$of/velodyne" -name '*.bin' -size +0 | wc -l)
   # Finished, and with as many scans as there are now.
   [ "$(cat "$to/scans.txt" 2> /dev/null)" != "$found" ] || continue
   echo "== $sequence" >&2
-  run "$revisit" compare "$of" --poses "$poses" --verify --out "$to" --overwrite
+  run "$revisit" compare "$of" --poses "$poses" --verify --out "$to" --overwrite \
+    ${METHODS:+--methods "$METHODS"}
   run "$revisit" slam "$of" --no-map --out "$to/slam" --overwrite
   "$revisit" evaluate "$to/slam" --reference "$poses" > "$to/slam.txt"
   echo "$found" > "$to/scans.txt"
