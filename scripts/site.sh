@@ -18,7 +18,7 @@ sed -E -i \
   -e 's#\]\((\.\./)*(bindings/)?(ros1|ros2|python)/README\.md#](\3.md#g' \
   -e 's#\]\((\.\./)*README\.md#](index.md#g' \
   -e 's#\]\((\.\./)*(CHANGELOG|CONTRIBUTING|SECURITY)\.md#](\L\2.md#g' \
-  -e 's#\[([^]]*)\]\((\.\./)*(LICENSE|examples|src|apps|bindings|scripts|tests|benchmarks|cmake|packages|notebooks|launch|node|dds)[^)]*\)#`\1`#g' "$sources"/*.md
+  -e 's#\[([^]]*)\]\((\.\./)*(LICENSE|examples|src|apps|bindings|scripts|tests|benchmarks|cmake|packages|notebooks|launch|node|dds|rosdep)[^)]*\)#`\1`#g' "$sources"/*.md
 {
   cat << 'DOXYFILE'
 PROJECT_NAME = revisit
