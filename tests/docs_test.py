@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """What README and docs tell people to type: blocks of commands are run, in their order and on small recordings; of all
-others the sub-command, its flags, scripts, targets and tests must exist. usage: docs_test.py REVISIT"""
+others the sub-command, its flags, scripts, targets and tests must exist, and so must what links lead to.
+
+usage: docs_test.py REVISIT"""
 import functools
 import os
 import pathlib
@@ -34,7 +36,7 @@ def blocks(page):
 
 
 def commands_of(page):
-    """Everything on a page that looks like a command: lines of blocks, indented lines, and what stands in backquotes."""
+    """What may be a command: lines of blocks, indented lines, and what stands in backquotes."""
     text = re.sub(r"\\\n\s*", "", page.read_text())
     found = [line for lines in blocks(page) for line in lines]
     found += re.findall(r"^    (\S.*)$", text, re.MULTILINE) + re.findall(r"`([^`\n]+)`", text)
@@ -103,6 +105,24 @@ class Docs(unittest.TestCase):
         (self.folder / "kitti" / "poses").mkdir(parents=True)
         (self.folder / "kitti" / "poses" / "00.txt").write_text(poses)
         self.run_block("docs/simulation.md", "build/revisit simulate --out drive ", {})
+
+    def test_every_link_leads_somewhere(self):
+        def anchors(page):
+            heads = re.findall(r"(?m)^#+ (.*)$", page.read_text())
+            return {re.sub(r"[^\w\- ]", "", head.lower()).strip().replace(" ", "-") for head in heads}
+
+        checked = 0
+        for page in [*PAGES, ROOT / "CHANGELOG.md", ROOT / "SECURITY.md"]:
+            for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
+                if re.match(r"[a-z]+:", target):
+                    continue
+                path, _, anchor = target.partition("#")
+                to = (page.parent / path) if path else page
+                self.assertTrue(to.exists(), f"{page.relative_to(ROOT)}: {target}")
+                if anchor:
+                    self.assertIn(anchor, anchors(to), f"{page.relative_to(ROOT)}: {target}")
+                checked += 1
+        self.assertGreater(checked, 100)
 
     def test_every_flag_script_and_target_exists(self):
         makefile = (ROOT / "Makefile").read_text()
