@@ -126,7 +126,7 @@ class Docs(unittest.TestCase):
 
     def test_every_flag_script_and_target_exists(self):
         makefile = (ROOT / "Makefile").read_text()
-        cmake = "".join(file.read_text() for file in [*ROOT.glob("**/CMakeLists.txt")] if "node_modules" not in str(file)
+        cmake = "".join(file.read_text() for file in ROOT.glob("**/CMakeLists.txt") if "node_modules" not in str(file)
                         and "build" not in file.relative_to(ROOT).parts)
         tests = cmake + "".join(file.read_text() for file in ROOT.glob("src/**/*_test.cpp")) + "".join(
             file.read_text() for file in ROOT.glob("tests/*.cpp"))
