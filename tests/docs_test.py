@@ -18,6 +18,7 @@ REVISIT = os.path.abspath(sys.argv.pop(1))
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md")),
          *sorted((ROOT / "bindings").glob("*/README.md"))]
+HAS_PAGE = (ROOT / "apps" / "viewer" / "dist" / "viewer.js").exists()  # `make viewer`
 SMALL = {"--frames": "24", "--sensor": "vlp16", "--length_m": "150"}
 
 
@@ -69,7 +70,7 @@ class Docs(unittest.TestCase):
             for name, value in replace.items():
                 line = re.sub(rf"(?<![\w./]){re.escape(name)}(?![\w./])", value, line)
             command = words(line)[1:]
-            if command[0] == "view" and "--report" not in command:
+            if command[0] == "view" and ("--report" not in command or not HAS_PAGE):
                 continue  # serves until it is stopped
             if command[0] == "simulate":
                 command += [word for flag, value in SMALL.items() if flag not in command for word in (flag, value)]
@@ -98,7 +99,7 @@ class Docs(unittest.TestCase):
             "scan.pcd": "drive0/velodyne/000012.bin", "--into maps/site --out tuesday": "--into maps/site --out again"})
         self.run_block("docs/viewer.md", "build/revisit view MAP ", {"RECORDING": "drive.bag", "--out MAP": "--out new",
                                                                     "MAP": "maps/site"})
-        self.assertTrue((self.folder / "map.html").exists())
+        self.assertEqual((self.folder / "map.html").exists(), HAS_PAGE)
 
     def test_the_commands_about_simulation(self):
         poses = "".join(f"1 0 0 {x} 0 1 0 0 0 0 1 0\n" for x in range(200))
