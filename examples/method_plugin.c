@@ -29,6 +29,7 @@ static double similarity(revisit_signature query, revisit_signature place, doubl
   const float *a = (const float*)query.words, *b = (const float*)place.words;
   double different = 0;
   (void)T_place_query; /* it says nothing of the pose */
+  if (query.count != WORDS || place.count != WORDS) return NAN;
   for (int i = 0; i < CELLS; ++i) different += fabsf(a[i] - b[i]);
   return 1 - different / 2;
 }

@@ -35,6 +35,7 @@ extern "C" const revisit_method_v1* revisit_method() {
   if (fault == "null") return nullptr;
   if (fault == "version") method.version = 99;
   if (fault == "name") method.name = "a/../b";
+  if (fault == "dots") method.name = "..";
   if (fault == "nameless") method.name = nullptr;
   if (fault == "describe") method.describe = nullptr;
   if (fault == "gives") method.gives = 7;

@@ -45,6 +45,7 @@ TEST(Plugin, FaultIsNamedWithTheFile) {
        std::vector<std::pair<const char*, const char*>>{{"null", "returns null"},
                                                         {"version", "version 99"},
                                                         {"name", "'a/../b'; allowed: letters"},
+                                                        {"dots", "its name is '..'; allowed: letters"},
                                                         {"nameless", "its name is ''"},
                                                         {"describe", "describe or similarity is null"},
                                                         {"gives", "gives is 7; allowed: 0 to 3"},

@@ -49,7 +49,8 @@ class Baseline {
   virtual Gives gives() const { return Gives::kPlace; }
   /// How many scans are described together, in the frame of the last one; more than one are laid together by odometry.
   virtual std::size_t scans() const { return 1; }
-  /// Only each how-many-th scan is a place: those that are described many together hardly differ from one to the next.
+  /// Only each how-many-th scan is a place that can be the answer: where many scans are described together, those that
+  /// follow each other hardly differ.
   virtual std::size_t place_every() const { return 1; }
 
   /// `points`: of that many scans, finite, metres, LiDAR frame, intensity in [0, 1]; `ground_z_m`: where the ground
@@ -61,7 +62,7 @@ class Baseline {
 
   /// How alike two places are; larger is more alike, the scale is the method's own.
   virtual double similarity(const Signature& query, const Signature& place) const = 0;
-  /// The similarity of two that have nothing in common at all: no answer.
+  /// What similarity() is where two places have nothing in common; such a place is no answer.
   virtual double least_similarity() const { return -std::numeric_limits<double>::infinity(); }
 
   /// Where the query stands in the frame of the place, as far as gives() says; what is not given is 0.

@@ -70,10 +70,13 @@ Status check(const std::string& file, const revisit_method_v1* method) {
     return Error{file + ": version " + std::to_string(method->version) + " of the interface; this program knows " +
                  std::to_string(REVISIT_METHOD_VERSION)};
   const std::string_view name = method->name == nullptr ? "" : method->name;
-  if (name.empty() || std::any_of(name.begin(), name.end(), [](unsigned char c) {
-        return std::isalnum(c) == 0 && c != '-' && c != '+' && c != '.';
-      }))
-    return Error{file + ": its name is '" + std::string(name) + "'; allowed: letters, digits, - + ."};
+  const auto is_alphanumeric = [](unsigned char c) { return std::isalnum(c) != 0; };
+  // A folder is called so: neither . nor .. may be one.
+  if (name.empty() || !is_alphanumeric(static_cast<unsigned char>(name.front())) ||
+      !std::all_of(name.begin(), name.end(),
+                   [&](unsigned char c) { return is_alphanumeric(c) || c == '-' || c == '+' || c == '.'; }))
+    return Error{file + ": its name is '" + std::string(name) +
+                 "'; allowed: letters, digits, - + ., a letter or digit first"};
   if (method->describe == nullptr || method->similarity == nullptr)
     return Error{file + ": describe or similarity is null"};
   const auto within = [&](const char* what, std::uint32_t value, std::uint32_t least, std::uint32_t most) -> Status {

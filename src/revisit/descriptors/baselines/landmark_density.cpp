@@ -2,11 +2,11 @@
 // Cieslewski, Stumm, Gawel, Bosse, Lynen and Siegwart, "Point Cloud Descriptors for Place Recognition using Sparse
 // Visual Information", ICRA 2016, NBLD (neighbour-binary landmark density): around a landmark, points are counted in
 // the cells of an upright cylinder; whether a cell is denser than each of its neighbours are the bits. Made for sparse
-// landmarks of cameras; here landmarks are the points of ten scans, one a voxel of 0.5 m, without the ground. What the
-// abstract leaves open is chosen here: the 60 landmarks with the most in a column of 1 m are described, up to
-// 40 m away; a cylinder is 12 m wide to each side, with 4 rings, 16 sectors and 4 layers of 2 m; sectors are counted
-// from where the centre of mass of the cylinder lies; a query's landmark votes for a place by how near its nearest
-// descriptor there is, as far as fewer than a quarter of the bits differ.
+// landmarks of cameras; here landmarks are the points of ten scans (each fifth is a place), one a voxel of 0.5 m,
+// without the ground. What the abstract leaves open is chosen here: the 60 landmarks with the most in a column of 1 m
+// are described, up to 40 m away; a cylinder is 12 m wide to each side, with 4 rings, 16 sectors and 4 layers of 2 m;
+// sectors are counted from where the centre of mass of the cylinder lies; a query's landmark votes for a place by how
+// near its nearest descriptor there is, as far as fewer than a quarter of the bits differ.
 #include <algorithm>
 #include <array>
 #include <bit>
