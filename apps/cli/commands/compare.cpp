@@ -168,16 +168,13 @@ Run add_compare(CLI::App& program) {
   CLI::App* command =
       program.add_subcommand("compare", "Run several published methods over a recording, side by side.");
   std::string footer =
-      "Prints tables 1 and 2 (docs/evaluation.md) with a row a method, judged by the poses of the recording, and "
-      "writes\n"
-      "comparison.txt, .csv, .tex, .json, precision_recall.png and a folder a method with its candidates.csv,\n"
+      "Prints tables 1 and 2 (docs/evaluation.md) with a row a method, judged by the poses of the recording, and\n"
+      "writes comparison.txt, .csv, .tex, .json, precision_recall.png and a folder a method with its candidates.csv,\n"
       "loops.csv, precision_recall.csv, failures.csv and a page (report.html). Each method works on one thread, may\n"
       "answer with the same earlier scans, and takes scans that were prepared in the same way (ground, intensity,\n"
-      "sweep);\n"
-      "isc-paper prepares them by its own preset.\n\n"
-      "Methods of your own: a shared library (--plugin; examples/method_plugin.c), revisit.compare(own=...) in "
-      "Python,\n"
-      "or --candidates with the candidates.csv (docs/formats.md) of any program.\n\n"
+      "sweep); isc-paper prepares them by its own preset.\n\n"
+      "Methods of your own: a shared library (--plugin; examples/method_plugin.c), revisit.compare(own=...) in\n"
+      "Python, or --candidates with the candidates.csv (docs/formats.md) of any program.\n\n"
       "Methods:\n"
       "  revisit                this program, with the parameters given; its scores are those after verification\n"
       "  revisit-retrieval      its index alone: the first answer, unverified\n"
@@ -197,7 +194,7 @@ Run add_compare(CLI::App& program) {
       ->delimiter(',')
       ->check(CLI::IsMember(known));
   command->add_option("--plugin", options->plugins,
-                      "Shared library with a method of your own (baseline_plugin.h); it is run. May be repeated");
+                      "Shared library with a method of your own (baseline_plugin.h), beside --methods; may be repeated");
   command->add_flag("--verify", options->verify,
                     "Register what each method answers as this program does, and judge it by table 2");
   command->add_flag("--pairs", options->pairs,
