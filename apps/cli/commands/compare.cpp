@@ -193,8 +193,9 @@ Run add_compare(CLI::App& program) {
   command->add_option("--methods", options->methods, "Only these (separated by commas); default: all")
       ->delimiter(',')
       ->check(CLI::IsMember(known));
-  command->add_option("--plugin", options->plugins,
-                      "Shared library with a method of your own (baseline_plugin.h), beside --methods; may be repeated");
+  command->add_option(
+      "--plugin", options->plugins,
+      "Shared library with a method of your own (baseline_plugin.h), beside --methods; may be repeated");
   command->add_flag("--verify", options->verify,
                     "Register what each method answers as this program does, and judge it by table 2");
   command->add_flag("--pairs", options->pairs,
