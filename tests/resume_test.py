@@ -131,6 +131,47 @@ def compare_power(name, folder, arguments_of, times, chance, library):
     print(f"{name}: the power failed {lost} times, before writes of {writes}, the same {same} files and tables")
 
 
+def compare_power_of_results(name, folder, before, command_of, times, chance, library):
+    """The power fails at a random write or new name of a command that writes results: each is the old one or the new one."""
+    def results(out):
+        return {str(path.relative_to(out)): hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(out.rglob("*"))
+                if path.is_file() and not path.name.endswith("evidence.csv")
+                and ".part" not in str(path.relative_to(out))}
+
+    def begin(out):
+        out.mkdir()
+        if before:
+            command(before(out), folder)
+        return results(out)
+
+    old = begin(folder / "whole")
+    environment = {"LD_PRELOAD": str(library), "POWER_FOLDER": str(folder), "POWER_COUNT": str(folder / "count")}
+    command(command_of(folder / "whole"), folder, environment=environment)
+    writes, new = int((folder / "count").read_text()), results(folder / "whole")
+    assert new and new != old
+    lost = 0
+    for i in range(times):
+        out = folder / f"dark{i}"
+        begin(out)
+        # Around the last ones, files get their names.
+        at = writes - i if i < times // 3 and i < writes else chance.randint(1, writes)
+        environment |= {"POWER_AT": str(at), "POWER_SEED": str(i)}
+        lost += command(command_of(out), folder, environment=environment) is None
+        wrong = {file for file, now in results(out).items() if now not in (old.get(file), new.get(file))}
+        wrong |= {file for file in old if file in new and file not in results(out)}
+        if wrong:
+            raise SystemExit(f"{name}: neither old nor new after write {at} of {writes}: {sorted(wrong)}; see {out}")
+        if before or results(out) != new:  # a merged map that is there is not written again
+            command(command_of(out), folder)
+        if results(out) != new:
+            raise SystemExit(f"{name}: once more, after write {at} of {writes}, gives something else; see {out}")
+        shutil.rmtree(out)
+        if sys.stderr.isatty():
+            print(f"\r{name}: {i + 1} of {times}", end="", file=sys.stderr)
+    shutil.rmtree(folder / "whole")
+    print(f"{name}: the power failed {lost} times, at writes of {writes}, each file the old or the new one")
+
+
 def main():
     global PROGRAM
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -158,6 +199,16 @@ def main():
         compare(name, folder, arguments_of, options.kills, chance)
         if options.power:
             compare_power(name, folder, arguments_of, options.kills, chance, options.power.resolve())
+    if options.power:
+        maps = [folder / "first" / "map.revisit", folder / "second" / "map.revisit"]
+        command(slam(days[1], folder / "second")[0], folder)
+
+        def export(number, form):
+            return lambda out: ["export", maps[number], "--as", form, "--out", out]
+
+        for name, before, command_of in [("merge", None, lambda out: ["merge", *maps, "--out", out / "all.revisit"]),
+                                         *((f"export {form}", export(0, form), export(1, form)) for form in ("las", "tiles", "grid", "tum"))]:
+            compare_power_of_results(name, folder, before, command_of, options.kills, chance, options.power.resolve())
     shutil.rmtree(folder)
 
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Loaded before libc (LD_PRELOAD): the power fails at a write. What was written to a file since it was synced last may
 // be on the disk or not, each write by itself, as on drives that put writes off and change their order.
-//   POWER_AT=N       before the N-th write (1 is the first) to a file below POWER_FOLDER; 0: never
+// A new name is on the disk at once, whatever of the file is.
+//   POWER_AT=N       before the N-th write (1 is the first) to a file below POWER_FOLDER, or after it, where it is a new
+//                    name; 0: never
 //   POWER_SEED=S     decides which of the writes reached the disk
 //   POWER_COUNT=FILE how many writes there were, at the end
 #include <algorithm>
@@ -72,6 +74,21 @@ class Disk {
       close(reader);
     }
     changes_.push_back(std::move(change));
+  }
+
+  // After a file or folder got another name, or (`is_exchange`) the two changed places.
+  void renamed(const std::string& from, const std::string& to, bool is_exchange) {
+    if (folder_.empty() || !to.starts_with(folder_)) return;
+    const std::lock_guard lock(mutex_);
+    for (Change& each : changes_) {
+      const auto moved = [&](const std::string& a, const std::string& b) {
+        if (each.path != a && !each.path.starts_with(a + "/")) return false;
+        each.path = b + each.path.substr(a.size());
+        return true;
+      };
+      if (!moved(from, to) && is_exchange) moved(to, from);
+    }
+    if (++writes_ == power_at_) fail();
   }
 
   void synced(int descriptor) {
@@ -161,6 +178,18 @@ int ftruncate64(int descriptor, off64_t size) noexcept {
   REAL(ftruncate64);
   disk().note(descriptor, size, nullptr, 0, true);
   return next(descriptor, size);
+}
+int rename(const char* from, const char* to) noexcept {
+  REAL(rename);
+  const int done = next(from, to);
+  if (done == 0) disk().renamed(from, to, false);
+  return done;
+}
+int renameat2(int from_folder, const char* from, int to_folder, const char* to, unsigned flags) noexcept {
+  REAL(renameat2);
+  const int done = next(from_folder, from, to_folder, to, flags);
+  if (done == 0) disk().renamed(from, to, (flags & RENAME_EXCHANGE) != 0);
+  return done;
 }
 int fsync(int descriptor) {
   REAL(fsync);

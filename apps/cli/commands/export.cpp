@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 
+#include <revisit/core/put_in_place.hpp>
 #include <revisit/core/text.hpp>
 #include <revisit/io/pose_file.hpp>
 #include <revisit/localisation/saved_map.hpp>
@@ -42,7 +43,7 @@ struct Part {
 };
 
 // On the grid of a UTM zone; points have an offset beside them.
-Status put_on_earth(const SavedMap& map, const ExportOptions& options, Part& part) {
+Status put_on_earth(const SavedMap& map, const ExportOptions& options, const fs::path& folder, Part& part) {
   const auto on_earth = MapOnEarth::of(*map.store(), options.part);
   if (!on_earth) return on_earth.error();
   if (!*on_earth)
@@ -60,7 +61,7 @@ Status put_on_earth(const SavedMap& map, const ExportOptions& options, Part& par
     part.offset_m = MapOnEarth::round_offset_m(part.poses.front());
     for (Pose& T : part.poses) T.translation() -= part.offset_m;
   }
-  const fs::path file = fs::path(options.out) / "utm.json";
+  const fs::path file = folder / "utm.json";
   part.epsg = frame.epsg();
   const bool is_in_file = options.as == "las";
   std::ofstream json(file);
@@ -86,7 +87,8 @@ Result<Part> find_part(const SavedMap& map, int number, std::optional<int> after
   return Error{"the map has no part " + std::to_string(number) + "; it has" + known};
 }
 
-Status export_points(const SavedMap& map, const Part& part, const ExportOptions& options, double voxel_m) {
+Status export_points(const SavedMap& map, const Part& part, const ExportOptions& options, const fs::path& folder,
+                     double voxel_m) {
   const MapStore& store = *map.store();
   MapInput input{part.poses,
                  [&](std::size_t i) { return read_map_points(store, part.frames[i], options.after_session); }};
@@ -95,46 +97,32 @@ Status export_points(const SavedMap& map, const Part& part, const ExportOptions&
   if (options.as == "ply" || options.as == "png") how.formats = {CloudFormat::kPly};
   if (options.as == "pcd") how.formats = {CloudFormat::kPcd};
   if (options.as == "las") how.formats = {CloudFormat::kLas};
-  // Beside what is in the folder already, which stays.
-  const fs::path out = options.out, scratch = out / ".export.part";
-  std::error_code failure;
-  if (options.as == "tiles" && fs::exists(out / "tiles", failure) &&
-      !fs::exists(out / "tiles" / "tileset.json", failure) &&
-      !fs::exists(out / "tiles" / "tiles.json", failure))  // of earlier versions
-    return Error{(out / "tiles").string() + ": is there already and holds no tileset.json; name another folder"};
-  fs::create_directories(scratch, failure);
-  if (failure) return Error{scratch.string() + ": cannot be created: " + failure.message()};
   Progress progress("export", "key frames", part.frames.size());
-  const auto report = build_map(input, how, scratch, [&](std::size_t done) {
+  const auto report = build_map(input, how, folder, [&](std::size_t done) {
     progress.update(done);
     return !interrupted();
   });
-  Status status = report ? ok() : Status(report.error());
-  if (status && interrupted()) status = Error{"interrupted; nothing was written"};
-  if (status && options.as == "png") status = draw_map(scratch / "map.png", scratch / "map.ply", part.poses);
-  if (status) {
-    const std::string name = options.as == "tiles" ? "tiles" : "map." + options.as;
-    if (options.as == "tiles") fs::remove_all(out / name, failure);
-    fs::rename(scratch / name, out / name, failure);
-    if (failure) status = Error{(out / name).string() + ": cannot be written: " + failure.message()};
-  }
+  if (!report) return report.error();
   std::error_code ignored;
-  fs::remove_all(scratch, ignored);
-  return status;
+  if (options.as != "tiles") fs::remove_all(folder / "tiles", ignored);
+  if (options.as != "png" || interrupted()) return ok();
+  const Status drawn = draw_map(folder / "map.png", folder / "map.ply", part.poses);
+  fs::remove(folder / "map.ply", ignored);
+  return drawn;
 }
 
-Status export_grid(const SavedMap& map, const Part& part, const ExportOptions& options) {
+Status export_grid(const SavedMap& map, const Part& part, const ExportOptions& options, const fs::path& folder) {
   Progress progress("export", "key frames", part.frames.size());
   const auto grid =
       grid_of_map(*map.store(), part.frames, part.poses, options.grid, options.after_session, [&](std::size_t done) {
         progress.update(done);
         return !interrupted();
       });
-  return grid ? grid->write(fs::path(options.out) / "grid.yaml") : Status(grid.error());
+  return grid ? grid->write(folder / "grid.yaml") : Status(grid.error());
 }
 
 // A file a session: every scan of it, in the coordinates of the map.
-Status export_trajectories(const SavedMap& map, const Part& part, const ExportOptions& options) {
+Status export_trajectories(const SavedMap& map, const Part& part, const fs::path& folder) {
   std::map<FrameId, Pose> T_out_keyframe;
   for (std::size_t i = 0; i < part.frames.size(); ++i) T_out_keyframe[part.frames[i]] = part.poses[i];
   const auto scans = map.store()->scans();
@@ -145,33 +133,61 @@ Status export_trajectories(const SavedMap& map, const Part& part, const ExportOp
       sessions[session_of(scan.frame)].entries[in_recording(scan.frame)] = {scan.stamp_s,
                                                                             T->second * scan.T_keyframe_lidar};
   for (const auto& [session, trajectory] : sessions)
-    if (const Status status =
-            write_tum_poses(fs::path(options.out) / ("session_" + std::to_string(session) + ".tum"), trajectory);
+    if (const Status status = write_tum_poses(folder / ("session_" + std::to_string(session) + ".tum"), trajectory);
         !status)
       return status;
+  return ok();
+}
+
+Status export_into(const fs::path& folder, const SavedMap& map, Part part, const ExportOptions& options,
+                   double voxel_m) {
+  if (options.utm)
+    if (const Status placed = put_on_earth(map, options, folder, part); !placed) return placed;
+  if (options.as == "grid") return export_grid(map, part, options, folder);
+  if (options.as == "tum") return export_trajectories(map, part, folder);
+  if (options.as == "g2o") return map.graph().write_g2o(folder / "graph.g2o");
+  return export_points(map, part, options, folder, voxel_m);
+}
+
+// Written beside what is in the folder already, which stays until all is complete.
+Status export_part(const SavedMap& map, const Part& part, const ExportOptions& options, double voxel_m) {
+  const fs::path out = options.out, scratch = out / ".export.part";
+  std::error_code failure;
+  if (options.as == "tiles" && fs::exists(out / "tiles", failure) &&
+      !fs::exists(out / "tiles" / "tileset.json", failure) &&
+      !fs::exists(out / "tiles" / "tiles.json", failure))  // of earlier versions
+    return Error{(out / "tiles").string() + ": is there already and holds no tileset.json; name another folder"};
+  const auto remove_all = [](const fs::path* folder) {
+    std::error_code ignored;
+    fs::remove_all(*folder, ignored);
+  };
+  remove_all(&scratch);  // what a run that was killed has left
+  const std::unique_ptr<const fs::path, decltype(remove_all)> at_the_end(&scratch, remove_all);
+  fs::create_directories(scratch, failure);
+  if (failure) return Error{scratch.string() + ": cannot be created: " + failure.message()};
+  if (const Status written = export_into(scratch, map, part, options, voxel_m); !written) return written;
+  if (interrupted()) return Error{"interrupted; nothing was written"};
+  std::set<fs::path> names;  // in their order: what names another file comes after it
+  for (fs::directory_iterator it(scratch, failure), end; !failure && it != end; it.increment(failure))
+    names.insert(it->path().filename());
+  if (failure) return Error{scratch.string() + ": cannot be read: " + failure.message()};
+  for (const fs::path& name : names)
+    if (const Status placed = put_in_place(scratch / name, out / name); !placed) return placed;
   return ok();
 }
 
 int run_export(const ExportOptions& options) {
   const auto parameters = options.parameters.resolve();
   if (!parameters) return fail(parameters.error(), kUsage);
-  const auto map = SavedMap::open(options.map);
-  if (!map) return fail(map.error());
-  auto part = find_part(*map, options.part, options.after_session);
-  if (!part) return fail({options.map + ": " + part.error().message});
-  std::error_code failure;
-  fs::create_directories(options.out, failure);
-  if (failure) return fail({options.out + ": cannot be created: " + failure.message()});
   if (options.utm && options.as == "g2o")
     return fail({"--utm: a pose graph has coordinates of its own; export tum instead"}, kUsage);
-  if (options.utm)
-    if (const Status placed = put_on_earth(*map, options, *part); !placed) return fail(placed.error());
+  const auto map = SavedMap::open(options.map);
+  if (!map) return fail(map.error());
+  const auto part = find_part(*map, options.part, options.after_session);
+  if (!part) return fail({options.map + ": " + part.error().message});
   listen_for_interrupt();
-  const Status status = options.as == "grid"  ? export_grid(*map, *part, options)
-                        : options.as == "tum" ? export_trajectories(*map, *part, options)
-                        : options.as == "g2o" ? map->graph().write_g2o(fs::path(options.out) / "graph.g2o")
-                                              : export_points(*map, *part, options, parameters->slam.map_voxel_m);
-  if (!status) return fail(status.error(), interrupted() ? kInterrupted : kFailed);
+  if (const Status status = export_part(*map, *part, options, parameters->slam.map_voxel_m); !status)
+    return fail(status.error(), interrupted() ? kInterrupted : kFailed);
   std::cout << part->frames.size() << " key frames as " << options.as << ": " << options.out << '\n';
   return kDone;
 }

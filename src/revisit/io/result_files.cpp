@@ -8,6 +8,7 @@
 #include <map>
 #include <sstream>
 
+#include <revisit/core/put_in_place.hpp>
 #include <revisit/io/internal/bytes.hpp>
 #include <revisit/io/internal/text_writer.hpp>
 
@@ -89,10 +90,9 @@ Status sort_rows(const fs::path& file, const std::map<FrameId, std::string>& rep
   for (const auto& [query, row] : rows) (sorted += row) += '\n';
   const fs::path partial = file.string() + ".part";
   Status done = write_text(partial, sorted);
-  std::error_code failure;
-  if (done) fs::rename(partial, file, failure);
-  if (failure) done = Error{file.string() + ": cannot be replaced: " + failure.message()};
-  if (!done) fs::remove(partial, failure);
+  if (done) done = put_in_place(partial, file);
+  std::error_code ignored;
+  if (!done) fs::remove(partial, ignored);
   return done;
 }
 

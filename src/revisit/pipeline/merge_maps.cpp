@@ -6,6 +6,7 @@
 #include <memory>
 #include <utility>
 
+#include <revisit/core/put_in_place.hpp>
 #include <revisit/core/text.hpp>
 #include <revisit/localisation/saved_map.hpp>
 #include <revisit/pipeline/slam_back_end.hpp>
@@ -236,8 +237,8 @@ Result<MergeReport> merge_maps(std::span<const fs::path> maps, const fs::path& o
   }
   if (report)
     if (const Status closed = written->close(); !closed) report = closed.error();
-  if (report) fs::rename(partial, out, failure);
-  if (report && failure) report = Error{out.string() + ": cannot be written: " + failure.message()};
+  if (report)
+    if (const Status named = put_in_place(partial, out); !named) report = named.error();
   return report;
 }
 

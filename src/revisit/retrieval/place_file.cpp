@@ -10,6 +10,7 @@
 #define XXH_INLINE_ALL  // whoever links this library needs no other
 #include <xxhash.h>
 
+#include <revisit/core/put_in_place.hpp>
 #include <revisit/retrieval/internal/place_store.hpp>
 
 namespace revisit::retrieval_internal {
@@ -112,9 +113,7 @@ Status PlaceStore::save(const std::string& path) const {
     return ok();
   });
   file.close();
-  std::error_code failed;
-  if (saved && file) std::filesystem::rename(partial, path, failed);
-  if (saved && file && !failed) return ok();
+  if (saved && file && put_in_place(partial, path)) return ok();
   std::error_code ignored;
   std::filesystem::remove(partial, ignored);
   if (!saved) return saved;
