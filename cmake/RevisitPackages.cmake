@@ -1,5 +1,5 @@
-# `make deb`: Debian packages of what was built, with CPack: the program (which carries the viewer's page), the library
-# (headers and static libraries), and the Python module.
+# `make deb`: Debian packages of what was built, with CPack: the program (which carries the viewer's page), the shared
+# library, the library to build on (headers and static libraries), and the Python module. debian/ makes the same.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME revisit)
 set(CPACK_PACKAGE_CONTACT "The revisit authors <revisit@packages.debian.org>")
@@ -24,7 +24,19 @@ folders of scans).")
 
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME librevisit-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
-set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libbz2-dev, libceres-dev, libeigen3-dev, libembree-dev, libgeographiclib-dev, \
+if(TARGET revisit_shared)
+  list(APPEND CPACK_COMPONENTS_ALL lib)
+  set(CPACK_DEBIAN_LIB_PACKAGE_NAME librevisit${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+  set(CPACK_DEBIAN_LIB_PACKAGE_SECTION libs)
+  set(CPACK_DEBIAN_LIB_PACKAGE_SHLIBDEPS ON)
+  set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
+  set(CPACK_DEBIAN_LIB_PACKAGE_CONTROL_EXTRA "${CMAKE_CURRENT_BINARY_DIR}/debian/triggers")
+  set(CPACK_DEBIAN_LIB_DESCRIPTION "Shared library: recognises from LiDAR scans the places that a robot
+has seen before, closes the loop, and makes maps.")
+  file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/debian/triggers "activate-noawait ldconfig\n")
+  set(shared_dependency "${CPACK_DEBIAN_LIB_PACKAGE_NAME} (= ${PROJECT_VERSION}), ")
+endif()
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "${shared_dependency}libbz2-dev, libceres-dev, libeigen3-dev, libembree-dev, libgeographiclib-dev, \
 libhwy-dev, liblz4-dev, libopencv-features2d-dev, libpcap-dev, libpcl-dev, libsqlite3-dev, libtbb-dev, libzstd-dev, pkg-config, zlib1g-dev")
 set(CPACK_DEBIAN_DEV_DESCRIPTION "C++ library: headers, static libraries and the CMake package
 (find_package(revisit)).")
@@ -44,17 +56,15 @@ NumPy arrays.")
 endif()
 
 # What Debian expects beside the files: a changelog, a copyright, and a page for `man`.
-string(TIMESTAMP date "%a, %d %b %Y 00:00:00 +0000" UTC)
-file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/debian/changelog "revisit (${PROJECT_VERSION}) unstable; urgency=medium
-
-  * Release ${PROJECT_VERSION}; what is new stands in CHANGELOG.md of the sources.
-
- -- ${CPACK_PACKAGE_CONTACT}  ${date}
-")
+file(STRINGS debian/changelog changelog LIMIT_COUNT 1)
+if(NOT changelog MATCHES "^revisit \\(${PROJECT_VERSION}\\)")
+  message(FATAL_ERROR "debian/changelog begins with '${changelog}', not with version ${PROJECT_VERSION}")
+endif()
+configure_file(debian/changelog ${CMAKE_CURRENT_BINARY_DIR}/debian/changelog COPYONLY)
 execute_process(COMMAND gzip -9nkf ${CMAKE_CURRENT_BINARY_DIR}/debian/changelog)
 foreach(component IN LISTS CPACK_COMPONENTS_ALL)
   string(TOUPPER ${component} name)
-  install(FILES ${PROJECT_SOURCE_DIR}/cmake/debian/copyright ${CMAKE_CURRENT_BINARY_DIR}/debian/changelog.gz
+  install(FILES ${PROJECT_SOURCE_DIR}/debian/copyright ${CMAKE_CURRENT_BINARY_DIR}/debian/changelog.gz
     DESTINATION share/doc/${CPACK_DEBIAN_${name}_PACKAGE_NAME} COMPONENT ${component} EXCLUDE_FROM_ALL)
 endforeach()
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/debian/revisit.1.gz DESTINATION share/man/man1 COMPONENT program OPTIONAL)
