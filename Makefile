@@ -1,5 +1,5 @@
 # The front door on a bare Debian 12 machine. `make demo` and `make test` install what is missing, build and run.
-.PHONY: demo viewer page python ros1 ros1-demo ros2 deb site sbom fuzz faults kills soak test oracles build configure packages bench lint format sanitize sanitize-readers clean
+.PHONY: demo viewer page python ros1 ros1-demo ros2 deb site sbom fuzz faults kills soak coverage test oracles build configure packages bench lint format sanitize sanitize-readers clean
 JOBS ?= $(shell nproc)
 # What ccache keeps of one clone serves the others.
 export CCACHE_BASEDIR ?= $(CURDIR)
@@ -63,6 +63,10 @@ fuzz: build
 # Every write, sync, rename, opening and allocation fails once: hours; MOST=50 for some of each.
 faults: build
 	tests/faults/run_faults.py build/release/revisit build/release/tests/libfail_call.so --most $(or $(MOST),0)
+
+# The share of the lines of src/ that the tests run, and out/coverage.txt.
+coverage: packages
+	@scripts/coverage.sh
 
 # An hour at the pace of a sensor through slam and localise; MINUTES=10 for a look.
 soak: build

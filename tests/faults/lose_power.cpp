@@ -2,7 +2,8 @@
 // Loaded before libc (LD_PRELOAD): the power fails at a write. What was written to a file since it was synced last may
 // be on the disk or not, each write by itself, as on drives that put writes off and change their order.
 // A new name is on the disk at once, whatever of the file is.
-//   POWER_AT=N       before the N-th write (1 is the first) to a file below POWER_FOLDER, or after it, where it is a new
+//   POWER_AT=N       before the N-th write (1 is the first) to a file below POWER_FOLDER, or after it, where it is a
+//   new
 //                    name; 0: never
 //   POWER_SEED=S     decides which of the writes reached the disk
 //   POWER_COUNT=FILE how many writes there were, at the end

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Scans at the pace of a sensor, ten a second: paced_drive slam SENSOR MINUTES FOLDER maps a drive into FOLDER,
 // paced_drive localise SENSOR MINUTES FOLDER SENSOR_OF_THE_MAP follows the drive of another day in that map. The scans
-// wait in a queue, as in a driver's; one that finds it full is dropped. Each minute it says how long scans took from the
-// end of their sweep to the answer, and how much memory there is. scripts/soak.sh runs both for an hour.
+// wait in a queue, as in a driver's; one that finds it full is dropped. Each minute it says how long scans took from
+// the end of their sweep to the answer, and how much memory there is. scripts/soak.sh runs both for an hour.
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>

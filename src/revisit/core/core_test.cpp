@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <clocale>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -8,6 +11,7 @@
 #include <revisit/core/intensity_calibration.hpp>
 #include <revisit/core/log.hpp>
 #include <revisit/core/loop.hpp>
+#include <revisit/core/put_in_place.hpp>
 #include <revisit/core/result.hpp>
 #include <revisit/core/scan.hpp>
 #include <revisit/core/text.hpp>
@@ -86,6 +90,38 @@ TEST(Format, WritesDecimalPointsInEveryLocale) {
   EXPECT_EQ(text, "1.50");
   if (!is_there) GTEST_SKIP() << "de_DE.UTF-8 is not installed; elsewhere this shows more";
   EXPECT_EQ(of_host[1], ',');
+}
+
+TEST(PutInPlace, ReplacesFilesAndFoldersAndNamesWhatItCannot) {
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::path(testing::TempDir()) / "PutInPlace";
+  fs::remove_all(folder);
+  const auto write = [&](const fs::path& name, const char* text) {
+    fs::create_directories((folder / name).parent_path());
+    std::ofstream(folder / name) << text;
+  };
+  const auto read = [&](const fs::path& name) {
+    std::ifstream file(folder / name);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  write("map.part", "new");
+  write("map", "old");
+  EXPECT_TRUE(put_in_place(folder / "map.part", folder / "map"));
+  EXPECT_EQ(read("map"), "new");
+  EXPECT_FALSE(fs::exists(folder / "map.part"));
+
+  write("tiles.part/a/1", "new");
+  write("tiles/a/1", "old");
+  write("tiles/gone", "old");
+  EXPECT_TRUE(put_in_place(folder / "tiles.part", folder / "tiles"));
+  EXPECT_EQ(read("tiles/a/1"), "new");
+  EXPECT_FALSE(fs::exists(folder / "tiles" / "gone"));
+  EXPECT_FALSE(fs::exists(folder / "tiles.part"));
+
+  const Status none = put_in_place(folder / "none", folder / "map");
+  ASSERT_FALSE(none);
+  EXPECT_NE(none.error().message.find("map: cannot be written: "), std::string::npos) << none.error().message;
+  EXPECT_EQ(read("map"), "new");
 }
 
 TEST(LogSink, SilentWithoutASink) {

@@ -19,36 +19,35 @@ namespace revisit {
 inline Status put_in_place(const std::filesystem::path& written, const std::filesystem::path& name) {
   namespace fs = std::filesystem;
   std::error_code failure;
-  const auto is_on_disk = [](const fs::path& path) {
+  const auto sync = [&failure](const fs::path& path) {
     const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    if (descriptor < 0) return false;
-    const bool is_synced = ::fsync(descriptor) == 0 || errno == EINVAL;  // a filesystem that knows no sync
-    ::close(descriptor);
-    return is_synced;
+    if (descriptor < 0 || (::fsync(descriptor) != 0 && errno != EINVAL))  // EINVAL: a filesystem that knows no sync
+      failure.assign(errno, std::generic_category());
+    if (descriptor >= 0) ::close(descriptor);
   };
   const auto fail = [&](const std::error_code& why) {
     return Error{name.string() + ": cannot be written: " + why.message()};
   };
-  bool is_synced = is_on_disk(written);
-  if (fs::is_directory(written, failure))
-    for (fs::recursive_directory_iterator it(written, failure), end; !failure && it != end; it.increment(failure))
-      is_synced = is_synced && is_on_disk(it->path());
-  if (failure) return fail(failure);
-  if (!is_synced) return fail(std::error_code(errno, std::generic_category()));
+  sync(written);
+  std::error_code of_folder;
+  if (fs::is_directory(written, of_folder))
+    for (fs::recursive_directory_iterator it(written, of_folder), end; !of_folder && it != end; it.increment(of_folder))
+      sync(it->path());
+  if (failure || of_folder) return fail(failure ? failure : of_folder);
   // A folder that holds something cannot be replaced; where the system can, the two change places.
   bool is_there = false;
-  if (fs::is_directory(name, failure)) {
+  std::error_code ignored;
+  if (fs::is_directory(name, ignored)) {
 #ifdef RENAME_EXCHANGE
     is_there = ::renameat2(AT_FDCWD, written.c_str(), AT_FDCWD, name.c_str(), RENAME_EXCHANGE) == 0;
 #endif
-    if (!is_there) fs::remove_all(name, failure);
+    if (!is_there) fs::remove_all(name, ignored);
   }
-  failure.clear();
   if (!is_there) fs::rename(written, name, failure);
   if (failure) return fail(failure);
-  is_on_disk(fs::absolute(name).parent_path());
-  if (is_there) fs::remove_all(written, failure);
-  return ok();
+  sync(fs::absolute(name).parent_path());
+  if (is_there) fs::remove_all(written, ignored);
+  return failure ? Status(fail(failure)) : ok();
 }
 
 }  // namespace revisit
