@@ -195,7 +195,9 @@ TEST(MergeMaps, JoinsWhatBelongsTogetherAndNothingElse) {
         return true;
       },
       [&](const Detection& detection) {
-        if (detection.loop) EXPECT_EQ(session_of(detection.loop->query), 2);
+        if (detection.loop) {
+          EXPECT_EQ(session_of(detection.loop->query), 2);
+        }
         accepted += detection.loop ? 1 : 0;
         return ok();
       });
