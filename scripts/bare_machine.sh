@@ -23,7 +23,7 @@ inside 'apt-get update -qq > /dev/null; mount -t proc proc /proc 2> /dev/null ||
 if [ "$what" = packages ]; then
   cp out/deb/*.deb "$root/tmp"
   inside '
-    apt-get install -y -qq --no-install-recommends /tmp/revisit_*.deb /tmp/python3-revisit_*.deb /tmp/librevisit-dev_*.deb cmake g++ make > /dev/null 2>&1
+    apt-get install -y -qq --no-install-recommends /tmp/*.deb cmake g++ make > /dev/null 2>&1
     cd /tmp
     revisit --version
     revisit simulate --sensor vlp16 --length_m 100 --out drive.mcap 2> /dev/null
@@ -31,7 +31,7 @@ if [ "$what" = packages ]; then
     revisit view map --report map.html
     python3 -c "import revisit; print(revisit.__version__, revisit.LoopDetector())"'
   cp -r tests/consumer "$root/tmp/consumer"
-  inside 'cmake -S /tmp/consumer -B /tmp/consumer/build > /dev/null && cmake --build /tmp/consumer/build > /dev/null && /tmp/consumer/build/consumer'
+  inside 'cmake -S /tmp/consumer -B /tmp/consumer/build > /dev/null && cmake --build /tmp/consumer/build > /dev/null && /tmp/consumer/build/consumer && /tmp/consumer/build/consumer_of_shared'
 else
   git clone -q . "$root/root/revisit"
   mkdir -p "$root/root/.cache/ccache"
