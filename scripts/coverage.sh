@@ -1,7 +1,7 @@
 #!/bin/sh
 # Which lines of src/ the tests run, counted with gcov in a build of its own: out/coverage.txt, a table by file, and the
 # share of all. usage: scripts/coverage.sh [MODULE ...]
-# Of modules, their own tests alone (some minutes); of everything, all tests, those of the program, too (an hour).
+# Of modules, their own tests alone (some minutes); of everything, all tests, those of the program, too.
 set -eu
 cd "$(dirname "$0")/.."
 scripts/install_packages.sh gcovr

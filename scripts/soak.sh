@@ -1,6 +1,6 @@
 #!/bin/sh
 # An hour at the pace of a sensor, ten scans a second, in a town at difficulty 1: an HDL-64E maps for half of it, an
-# OS0-128 of another day is then followed in that map. usage: scripts/soak.sh [MINUTES=60]
+# OS0-128 of another day is then followed in that map. usage: scripts/soak.sh [MINUTES=60, at least 2]
 # Fails where a scan was dropped. Build first (`make soak` does).
 set -eu
 cd "$(dirname "$0")/.."

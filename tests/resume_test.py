@@ -5,7 +5,8 @@
 usage: tests/resume_test.py PROGRAM [--power LIBRARY] [--kills N] [--seed N]
 Of each way to run it: as it is, with wheels and GPS, and as a second session of a map. What differs by its nature is left out:
 times (run.json), and the pages of map.revisit, whose tables are compared row by row. With the library of faults/lose_power.cpp the
-power fails, too: writes that were not synced are lost or not, each by itself. Then the files of evidence, which are never synced, may lack rows.
+power fails, too, and so it does while `merge` and `export` write: writes that were not synced are lost or not, each by itself. The files
+of evidence, which are never synced, may then lack rows.
 """
 
 import argparse
@@ -73,6 +74,11 @@ def with_options(slam, *options):
     return [*arguments, *options], made
 
 
+def progress(name, done, of):
+    if sys.stderr.isatty():
+        print(f"\r{name}: {done} of {of}", end="", file=sys.stderr)
+
+
 def compare(name, folder, arguments_of, kills, chance):
     """Kills so often, a few times a run; the moments are spread over all of it."""
     arguments, made = arguments_of(folder / "whole")
@@ -98,8 +104,7 @@ def compare(name, folder, arguments_of, kills, chance):
         if differing:
             raise SystemExit(f"{name}: these differ after kills: {differing}; see {folder}")
         shutil.rmtree(out)
-        if sys.stderr.isatty():
-            print(f"\r{name}: {done} of {kills} kills", end="", file=sys.stderr)
+        progress(name, done, kills)
     shutil.rmtree(folder / "whole")
     print(f"{name}: {done} kills in {runs} runs, the same {len(whole)} files and tables")
 
@@ -124,8 +129,7 @@ def compare_power(name, folder, arguments_of, times, chance, library):
         if differing:
             raise SystemExit(f"{name}: these differ after write {environment['POWER_AT']} of {writes}: {differing}; see {folder}")
         shutil.rmtree(out)
-        if sys.stderr.isatty():
-            print(f"\r{name}: {i + 1} of {times}", end="", file=sys.stderr)
+        progress(name, i + 1, times)
     shutil.rmtree(folder / "whole")
     same = sum(not each.endswith("evidence.csv") for each in whole)
     print(f"{name}: the power failed {lost} times, before writes of {writes}, the same {same} files and tables")
@@ -166,8 +170,7 @@ def compare_power_of_results(name, folder, before, command_of, times, chance, li
         if results(out) != new:
             raise SystemExit(f"{name}: once more, after write {at} of {writes}, gives something else; see {out}")
         shutil.rmtree(out)
-        if sys.stderr.isatty():
-            print(f"\r{name}: {i + 1} of {times}", end="", file=sys.stderr)
+        progress(name, i + 1, times)
     shutil.rmtree(folder / "whole")
     print(f"{name}: the power failed {lost} times, at writes of {writes}, each file the old or the new one")
 

@@ -4,6 +4,7 @@
 // wait in a queue, as in a driver's; one that finds it full is dropped. Each minute it says how long scans took from
 // the end of their sweep to the answer, and how much memory there is. scripts/soak.sh runs both for an hour.
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
@@ -76,7 +77,7 @@ double memory_mb() {
 }
 
 struct Load {
-  std::vector<double> ms, memory;  // of each scan; at the end of each minute
+  std::vector<double> ms, memory_mb;  // of each scan; at the end of each minute
   std::size_t dropped = 0, late = 0;
 };
 
@@ -91,17 +92,18 @@ double share(std::vector<double> values, double of) {
 Load drive(const SimulatedRecording& recording, std::size_t scans, const std::function<std::string(Due)>& answer) {
   Queue queue;
   Load load;
+  std::atomic<std::size_t> dropped = 0, late = 0;
   std::thread driver([&] {
     Clock::time_point next = Clock::now() + kPeriod;
     for (std::size_t i = 0; i < scans; ++i, next += kPeriod) {
       auto scan = recording.read(i);
       if (!scan) continue;
       if (Clock::now() > next) {  // the simulator's own fault
-        ++load.late;
+        ++late;
         next = Clock::now();
       }
       std::this_thread::sleep_until(next);
-      if (!queue.push({*std::move(scan), i, next})) ++load.dropped;
+      if (!queue.push({*std::move(scan), i, next})) ++dropped;
     }
     queue.close();
   });
@@ -114,14 +116,16 @@ Load drive(const SimulatedRecording& recording, std::size_t scans, const std::fu
     load.ms.push_back(ms);
     minute.push_back(ms);
     if ((i + 1) % kScansAMinute != 0) continue;
-    load.memory.push_back(memory_mb());
+    load.memory_mb.push_back(memory_mb());
     std::printf("%3zu min: median %.0f, 99 %% %.0f, most %.0f ms; %.0f MB; %zu dropped; %s\n", (i + 1) / kScansAMinute,
-                share(minute, 0.5), share(minute, 0.99), share(minute, 1.0), load.memory.back(), load.dropped,
+                share(minute, 0.5), share(minute, 0.99), share(minute, 1.0), load.memory_mb.back(), dropped.load(),
                 state.c_str());
     std::fflush(stdout);
     minute.clear();
   }
   driver.join();
+  load.dropped = dropped;
+  load.late = late;
   std::printf("%zu scans: median %.0f, 99 %% %.0f, 99.9 %% %.0f, most %.0f ms; %zu dropped; %zu simulated too late\n",
               load.ms.size(), share(load.ms, 0.5), share(load.ms, 0.99), share(load.ms, 0.999), share(load.ms, 1.0),
               load.dropped, load.late);
@@ -152,11 +156,11 @@ int run_slam(const SimulatedRecording& recording, std::size_t scans, const std::
   });
   if (!failure.empty()) return fail(failure);
   if (const Status done = slam->finish(); !done) return fail(done.error().message);
-  const std::size_t half = keyframes_by_minute.size() / 2, last = keyframes_by_minute.size() - 1;
-  if (last > half && load.memory.size() == keyframes_by_minute.size())
+  const std::size_t minutes = load.memory_mb.size(), half = minutes / 2;
+  if (minutes > half + 1 && minutes == keyframes_by_minute.size())
     std::printf("memory over the last half: %.1f kB a key frame\n",
-                1e3 * (load.memory[last] - load.memory[half]) /
-                    std::max(1.0, keyframes_by_minute[last] - keyframes_by_minute[half]));
+                1e3 * (load.memory_mb.back() - load.memory_mb[half]) /
+                    std::max(1.0, keyframes_by_minute.back() - keyframes_by_minute[half]));
   return load.dropped == 0 ? 0 : 1;
 }
 
@@ -180,9 +184,9 @@ int run_localise(const SimulatedRecording& recording, const Pose& T_world_map, s
   // The map drifts a little; what is meant to be seen here are poses of another place.
   std::printf("from the truth: median %.2f m, 99 %% %.2f m, most %.2f m\n", share(errors_m, 0.5), share(errors_m, 0.99),
               share(errors_m, 1.0));
-  const std::size_t half = load.memory.size() / 2;
-  if (load.memory.size() > half + 1)
-    std::printf("memory over the last half: %+.1f MB\n", load.memory.back() - load.memory[half]);
+  const std::size_t half = load.memory_mb.size() / 2;
+  if (load.memory_mb.size() > half + 1)
+    std::printf("memory over the last half: %+.1f MB\n", load.memory_mb.back() - load.memory_mb[half]);
   return load.dropped == 0 ? 0 : 1;
 }
 
@@ -193,6 +197,7 @@ int main(int argc, char** argv) {
   if (argc != (maps ? 5 : 6))
     return fail("usage: paced_drive slam SENSOR MINUTES FOLDER, or localise SENSOR MINUTES FOLDER SENSOR_OF_THE_MAP");
   const std::size_t scans = kScansAMinute * std::strtoull(argv[3], nullptr, 10);
+  if (scans == 0) return fail(std::string("MINUTES is '") + argv[3] + "'; allowed: whole numbers from 1 on");
   SimulationOptions options;
   options.sensor = argv[2];
   options.seed = 24;
