@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
 # What each ingredient of detection brings: tables 1 and 2 (docs/evaluation.md) with one of them removed at a time, over
-# the first scans of a simulated town. usage: scripts/ablation.sh POSE_FILE OUT [SEED] [SENSOR] [FRAMES]
+# the first scans of a simulated town. usage: scripts/ablation.sh POSE_FILE OUT [SEED] [SENSOR] [FRAMES] [DIFFICULTY]
 set -euo pipefail
-usage="usage: scripts/ablation.sh POSE_FILE OUT [SEED] [SENSOR] [FRAMES]"
-poses=$(realpath "${1:?$usage}") out=$(realpath -m "${2:?$usage}") seed=${3:-42} sensor=${4:-hdl64e} frames=${5:-1900}
+usage="usage: scripts/ablation.sh POSE_FILE OUT [SEED] [SENSOR] [FRAMES] [DIFFICULTY]"
+poses=$(realpath "${1:?$usage}") out=$(realpath -m "${2:?$usage}") seed=${3:-42} sensor=${4:-hdl64e} frames=${5:-1900} difficulty=${6:-1}
 cd "$(dirname "$0")/.."
 mkdir -p "$out"
 drive=$out/drive
 if [ ! -d "$drive" ]; then
-  build/revisit simulate --out "$drive" --sensor "$sensor" --seed "$seed" --trajectory "$poses" --frames "$frames"
+  build/revisit simulate --out "$drive" --sensor "$sensor" --seed "$seed" --trajectory "$poses" --frames "$frames" \
+    --difficulty "$difficulty"
 fi
 # The same scans without the times of their points: nothing can be undone.
 mkdir -p "$out/no_times"

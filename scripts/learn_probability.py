@@ -16,8 +16,7 @@ import numpy as np
 
 RIGHT_M, RIGHT_DEG = 0.5, 3.0  # docs/evaluation.md
 WRONG_M, WRONG_DEG = 2.0, 10.0  # in between, the place is right and the pose poor: nothing is learnt from it
-NAMES = ["inlier_share", "free_space", "intensity", "rmse", "least_fixed", "few"]
-WITHOUT_INTENSITY = [0, 1, 3, 4, 5]
+NAMES = ["inlier_share", "free_space", "intensity", "rmse", "least_fixed", "few", "hidden"]
 REGULARISED = 2e-2
 FINE_M = 0.75  # below, voxels are those of scans that are thinned finely (docs/method.md, section 7)
 
@@ -43,16 +42,17 @@ def load(folder):
             error = np.linalg.inv(np.linalg.inv(poses[int(row["match"])]) @ poses[int(row["query"])]) @ matrix(
                 *(float(row[k]) for k in ("tx", "ty", "tz", "qx", "qy", "qz", "qw")))
             angle = np.degrees(np.arccos(np.clip((np.trace(error[:3, :3]) - 1) / 2, -1, 1)))
-            distance = min(float(row["distance_m"]), 12.0) / 10.0
+            distance_m = min(float(row["distance_m"]), 12.0)
             off_m = np.linalg.norm(error[:3, 3])
             is_right = off_m <= RIGHT_M and angle <= RIGHT_DEG
             if not is_right and off_m < WRONG_M and angle < WRONG_DEG:
                 continue
-            X.append([min(float(row["inlier_share"]) / (1.0 - 0.3 * distance), 1.1), -np.log(1.004 - free),
+            X.append([min(float(row["inlier_share"]) / (1.0 - 0.02 * distance_m), 1.1), -np.log(1.004 - free),
                       np.clip(float(row["intensity_agreement"] or 0.0), -0.2, 1.1),
                       float(row["rmse_m"]) / float(row.get("voxel_m") or 1.0),
                       max(0.0, float(row["least_fixed"]))**0.5,
-                      np.log(np.clip(float(row["inliers"]), 10.0, 300.0) / 300.0)])
+                      np.log(np.clip(float(row["inliers"]), 10.0, 300.0) / 300.0),
+                      float(row["hidden_share"]) - 0.03 * distance_m])
             right.append(is_right)
             queries.append(int(row["query"]))
             fine.append(float(row.get("voxel_m") or 1.0) < FINE_M)
@@ -99,7 +99,10 @@ def main():
     for fine in (False, True):
         pairs = [(f.name, of_scale(r, fine)) for f, r in zip(folders, everything)]
         names, recordings = zip(*[(name, r) for name, r in pairs if r is not None])
-        for intensity, columns in ((True, list(range(len(NAMES)))), (False, WITHOUT_INTENSITY)):
+        for intensity in (True, False):
+            # In the open, what is hidden is hidden by what has changed as often as by another place.
+            columns = [i for i, name in enumerate(NAMES)
+                       if (fine or name != "hidden") and (intensity or name != "intensity")]
             slopes, constant = learn(recordings, columns)
             print("fine" if fine else "coarse", "with intensity" if intensity else "without",
                   {NAMES[c]: round(float(s), 3) for c, s in zip(columns, slopes)}, "constant", round(constant, 3))

@@ -62,12 +62,15 @@ class RankCorrelation {
 
 struct DirectionalAgreement {
   RankCorrelation intensities;
-  std::size_t visible = 0, inliers = 0, seen_through = 0;
+  std::size_t visible = 0, inliers = 0, seen_through = 0, hidden = 0;
   double squared_sum = 0.0;
   Eigen::Matrix3d normals = Eigen::Matrix3d::Zero();  // sum of n n^T over the inliers
 
-  double ratio() const {
-    return visible < Measures::kFewestPoints ? 0.0 : static_cast<double>(inliers) / static_cast<double>(visible);
+  double ratio() const { return share(inliers, visible); }
+  double in_sight_ratio() const { return share(inliers, visible - hidden); }
+  double hidden_share() const { return share(hidden, visible); }
+  static double share(std::size_t some, std::size_t all) {
+    return all < Measures::kFewestPoints ? 0.0 : static_cast<double>(some) / static_cast<double>(all);
   }
   // Of the directions at right angles to `up`, the mean square of the normals along the one where it is least.
   double least_fixed(const Eigen::Vector3d& up) const {
@@ -103,8 +106,10 @@ DirectionalAgreement agreement_one_way(const SurfaceCloud& to, const SurfaceClou
       result.normals.noalias() += n * n.transpose();
       result.intensities.add(from.intensity(i), to.intensity(neighbour->index));
       result.squared_sum += distance * distance;
-    } else if (to.seen().look(p.cast<float>(), seen_margin_m) == SeenSpace::Verdict::kThrough) {
-      ++result.seen_through;
+    } else {
+      const SeenSpace::Verdict verdict = to.seen().look(p.cast<float>(), seen_margin_m);
+      if (verdict == SeenSpace::Verdict::kThrough) ++result.seen_through;
+      if (verdict == SeenSpace::Verdict::kHidden) ++result.hidden;
     }
   }
   return result;
@@ -119,6 +124,8 @@ Agreement measure_agreement(const SurfaceCloud& target, const SurfaceCloud& sour
                        [&] { back = agreement_one_way(source, target, T_target_source.inverse(), inlier_distance_m); });
   Agreement result;
   result.inlier_ratio = std::min(forth.ratio(), back.ratio());
+  result.in_sight_ratio = std::min(forth.in_sight_ratio(), back.in_sight_ratio());
+  result.hidden_share = std::max(forth.hidden_share(), back.hidden_share());
   result.least_fixed =
       std::min(forth.least_fixed(target.up().cast<double>()), back.least_fixed(source.up().cast<double>()));
   result.inliers = std::min(forth.inliers, back.inliers);

@@ -258,6 +258,8 @@ TEST(Agreement, WallsThatTheOtherScanSawThroughCount) {
   const Agreement differing = measure_agreement(open, walled, Pose::Identity(), 0.4);
   EXPECT_LT(differing.free_space_agreement, 0.97);
   EXPECT_GT(differing.free_space_agreement, 0.8) << "what the wall hides is no dispute";
+  EXPECT_GT(differing.hidden_share, 0.05);
+  EXPECT_GT(differing.in_sight_ratio, differing.inlier_ratio + 0.05) << "and nothing that does not fit";
 }
 
 TEST(Agreement, IntensitiesAreComparedWhereThereAreAny) {

@@ -15,8 +15,8 @@ bool is_share(double value) { return value > 0.0 && value <= 1.0; }
 std::string to_text(const SensorFacts& facts) {
   std::ostringstream text;
   text << std::setprecision(17) << facts.intensity_scale.full_scale << ' ' << facts.intensity_scale.is_reflectance
-       << ' ' << facts.typical.inlier_ratio << ' ' << facts.typical.intensity_correlation << ' ' << facts.typical_pairs
-       << ' ' << facts.look_alikes_log_odds;
+       << ' ' << facts.typical.in_sight_ratio << ' ' << facts.typical.intensity_correlation << ' '
+       << facts.typical_pairs << ' ' << facts.look_alikes_log_odds;
   return text.str();
 }
 
@@ -24,10 +24,10 @@ Result<std::optional<SensorFacts>> to_sensor_facts(const std::string& text) {
   if (text.empty()) return std::optional<SensorFacts>();
   SensorFacts facts;
   std::istringstream stream(text);
-  stream >> facts.intensity_scale.full_scale >> facts.intensity_scale.is_reflectance >> facts.typical.inlier_ratio >>
+  stream >> facts.intensity_scale.full_scale >> facts.intensity_scale.is_reflectance >> facts.typical.in_sight_ratio >>
       facts.typical.intensity_correlation >> facts.typical_pairs;
   const double full_scale = facts.intensity_scale.full_scale;
-  if (!stream || !(full_scale > 0.0) || !std::isfinite(full_scale) || !is_share(facts.typical.inlier_ratio) ||
+  if (!stream || !(full_scale > 0.0) || !std::isfinite(full_scale) || !is_share(facts.typical.in_sight_ratio) ||
       !is_share(facts.typical.intensity_correlation))
     return Error{"what the map knows of the sensor is damaged: '" + text + "'"};
   if (!(stream >> facts.look_alikes_log_odds)) facts.look_alikes_log_odds = 0.0;  // of a map of version 2

@@ -69,7 +69,8 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
   all.one_is_narrow =
       std::abs(match.view().sector.width_rad - query.view().sector.width_rad) > Differing::kNarrower_rad;
   all.inlier_share =
-      agreement.inlier_ratio / (view.typical.inlier_ratio * (all.sensors_differ ? Differing::kShare : 1.0));
+      agreement.in_sight_ratio / (view.typical.in_sight_ratio * (all.sensors_differ ? Differing::kShare : 1.0));
+  all.hidden_share = agreement.hidden_share;
   all.free_space_agreement = agreement.free_space_agreement;
   if (agreement.intensity_correlation)
     all.intensity_agreement = *agreement.intensity_correlation / view.typical.intensity_correlation;

@@ -33,11 +33,12 @@ TEST(GeometricConsistency, ARevisitGivesItsPose) {
 TEST(GeometricConsistency, InliersCountAsAShareOfTheTypicalOnes) {
   ScanGeometry match = scan_at(31, SyntheticWorld::at(0, 0, 0)), query = scan_at(31, SyntheticWorld::at(2, 1, 0.0));
   const auto in = [&](double typical) {
-    return check_geometric(match, query, {planar_pose(0, 0, 0.0), 0.8, {.inlier_ratio = typical}}, {});
+    return check_geometric(match, query, {planar_pose(0, 0, 0.0), 0.8, {.in_sight_ratio = typical}}, {});
   };
   const GeometricEvidence field = in(0.85), shelves = in(1.0);
   EXPECT_DOUBLE_EQ(field.evidence.inlier_ratio, shelves.evidence.inlier_ratio);
-  EXPECT_NEAR(field.evidence.inlier_share, shelves.evidence.inlier_ratio / 0.85, 1e-9);
+  EXPECT_NEAR(field.evidence.inlier_share, shelves.evidence.inlier_share / 0.85, 1e-9);
+  EXPECT_GT(shelves.evidence.inlier_share, shelves.evidence.inlier_ratio) << "what is hidden does not count";
   EXPECT_GT(field.log_odds, shelves.log_odds + 1.0);
 }
 

@@ -20,7 +20,8 @@ class LookAlikes {
   double log_odds() const;
 
   /// The same for scores of places that a finished map knows to be elsewhere: where these stay below what other
-  /// recordings have, more than nothing is added.
+  /// recordings have, more than nothing is added. Its places are all known: what they reach at most is where a tail
+  /// with an end has it, while a recording must expect what it has not seen yet.
   double log_odds_in_map() const;
 
   static constexpr double kNotRegistered = -20.0;
@@ -30,7 +31,7 @@ class LookAlikes {
   }
 
  private:
-  double correction(double most_trust) const;
+  double correction(bool is_map) const;
 
   std::vector<double> scores_;  ///< the last ones, in order
   std::size_t next_ = 0;

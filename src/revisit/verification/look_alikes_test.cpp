@@ -31,6 +31,19 @@ TEST(LookAlikes, TheMoreWrongPlacesReachTheMoreIsAsked) {
   EXPECT_GE(with_scores(20.0, 3.0, 300).log_odds(), -4.0) << "never so much that nothing passes";
 }
 
+// Scores up to 2 and no farther, as of rows of like houses: an exponential tail would expect 4 and more.
+TEST(LookAlikes, InAMapWhatIsAlikeHasAnEnd) {
+  const auto up_to = [](double most) {
+    LookAlikes alike;
+    for (int i = 0; i < 120; ++i) alike.add(most - 20.0 * ((i * 37) % 120 + 0.5) / 120.0);
+    return alike;
+  };
+  EXPECT_LT(up_to(2.0).log_odds(), -0.5);
+  EXPECT_NEAR(up_to(2.0).log_odds_in_map(), 0.0, 0.3);
+  EXPECT_NEAR(up_to(3.5).log_odds_in_map(), -1.2, 0.3) << "less a fifth, since there are few scores";
+  EXPECT_GT(with_scores(-15.0, 1.5, 300).log_odds_in_map(), 2.0) << "nothing is alike";
+}
+
 TEST(LookAlikes, WhatWasNotWorthRegisteringMakesNoTail) {
   LookAlikes alike;
   for (int i = 0; i < 200; ++i) alike.add(LookAlikes::kNotRegistered);

@@ -9,9 +9,10 @@ namespace revisit {
 /// What speaks for or against a registered pair of scans showing the same place at the pose that was found.
 struct LoopEvidence {
   double inlier_ratio = 0.0;  ///< smaller of both directions
-  /// The same as a share of what scans lately show of the one before them: in a field nothing fits well, between
-  /// shelves everything does.
+  /// Of what was in sight (Agreement::in_sight_ratio), as a share of what scans lately show of the one before them: in
+  /// a field nothing fits well, between shelves everything does.
   double inlier_share = 0.0;
+  double hidden_share = 0.0;          ///< larger of both directions (Agreement)
   double free_space_agreement = 0.0;  ///< smaller of both directions
   /// Correlation of intensities, as a share of that between consecutive scans; none where intensities say nothing.
   std::optional<double> intensity_agreement;

@@ -47,6 +47,18 @@ TEST(LoopProbability, EachPieceOfEvidenceCounts) {
   EXPECT_GT(after([](LoopEvidence& e) { e.distance_m += 4.0; }), before) << "from afar less must fit";
 }
 
+// A room whose door is shut instead of open is another room; in the open, something drove into the way.
+TEST(LoopProbability, WhatIsHiddenCountsInRooms) {
+  const auto log_odds = [](double voxel_m, double hidden_share) {
+    LoopEvidence evidence = usual_revisit();
+    evidence.voxel_m = voxel_m;
+    evidence.hidden_share = hidden_share;
+    return loop_log_odds(evidence);
+  };
+  EXPECT_LT(log_odds(0.5, 0.3), log_odds(0.5, 0.05));
+  EXPECT_EQ(log_odds(1.0, 0.3), log_odds(1.0, 0.05));
+}
+
 TEST(LoopProbability, WithoutIntensitiesGeometryDecides) {
   LoopEvidence evidence = usual_revisit();
   evidence.intensity_agreement.reset();

@@ -29,20 +29,19 @@ bool TypicalAgreementEstimate::add(const ScanGeometry& previous, const ScanGeome
                                   {.coarse_m = Typical::kCoarse_m, .settled_m = Typical::kSettled_m});
   const Agreement agreement = measure_agreement(previous.surface(), current.surface(), icp.T_target_source,
                                                 PairScale(previous.surface(), current.surface()).inlier_distance_m());
-  if (agreement.inlier_ratio < Typical::kFewestInliers) return false;
+  const double ratio = agreement.in_sight_ratio;
+  if (ratio < Typical::kFewestInliers) return false;
   if (agreement.intensity_correlation && T_previous_current.translation().norm() > Typical::kStill_m)
     add_correlation(*agreement.intensity_correlation, 1);
-  const double ratio = agreement.inlier_ratio;
-  recent_inlier_ratio_ =
-      recent_inlier_ratio_ ? *recent_inlier_ratio_ + Typical::kNewShare * (ratio - *recent_inlier_ratio_) : ratio;
-  inlier_ratio_sum_ += ratio;
-  ++inlier_pairs_;
+  recent_ratio_ = recent_ratio_ ? *recent_ratio_ + Typical::kNewShare * (ratio - *recent_ratio_) : ratio;
+  ratio_sum_ += ratio;
+  ++ratio_pairs_;
   return true;
 }
 
 void TypicalAgreementEstimate::restore(const TypicalAgreement& typical, std::size_t pairs) {
-  inlier_ratio_sum_ += static_cast<double>(pairs) * typical.inlier_ratio;
-  inlier_pairs_ += pairs;
+  ratio_sum_ += static_cast<double>(pairs) * typical.in_sight_ratio;
+  ratio_pairs_ += pairs;
   add_correlation(typical.intensity_correlation, static_cast<std::uint32_t>(pairs));
 }
 
@@ -53,8 +52,7 @@ void TypicalAgreementEstimate::add_correlation(double correlation, std::uint32_t
 
 TypicalAgreement TypicalAgreementEstimate::overall() const {
   TypicalAgreement typical;
-  if (inlier_pairs_ >= Typical::kFewestPairs)
-    typical.inlier_ratio = inlier_ratio_sum_ / static_cast<double>(inlier_pairs_);
+  if (ratio_pairs_ >= Typical::kFewestPairs) typical.in_sight_ratio = ratio_sum_ / static_cast<double>(ratio_pairs_);
   if (correlation_pairs_ < Typical::kFewestPairs) return typical;
   std::size_t bin = 0, below = correlations_[0];
   while (2 * below < correlation_pairs_) below += correlations_[++bin];
@@ -64,7 +62,7 @@ TypicalAgreement TypicalAgreementEstimate::overall() const {
 
 TypicalAgreement TypicalAgreementEstimate::recent() const {
   TypicalAgreement typical = overall();
-  typical.inlier_ratio = recent_inlier_ratio_.value_or(typical.inlier_ratio);
+  typical.in_sight_ratio = recent_ratio_.value_or(typical.in_sight_ratio);
   return typical;
 }
 

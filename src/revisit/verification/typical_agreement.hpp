@@ -14,10 +14,10 @@ namespace revisit {
 /// How well consecutive scans of this sensor agree: scans of the same place hardly agree better. The defaults hold
 /// until enough is known.
 struct TypicalAgreement {
-  double inlier_ratio = 0.9;            ///< in (0, 1]
+  double in_sight_ratio = 0.9;          ///< of inliers (Agreement), in (0, 1]
   double intensity_correlation = 0.95;  ///< in (0, 1]
 
-  void archive(auto& fields) { fields(inlier_ratio, intensity_correlation); }
+  void archive(auto& fields) { fields(in_sight_ratio, intensity_correlation); }
 };
 
 /// Learns the typical agreement from pairs of consecutive scans while they come in. Belongs to one thread at a time.
@@ -27,7 +27,7 @@ class TypicalAgreementEstimate {
   /// be wrong: nothing is learnt then.
   bool add(const ScanGeometry& previous, const ScanGeometry& current, const Pose& T_previous_current);
   /// Odometry did not follow: what the last scans showed holds no longer.
-  void interrupt() { recent_inlier_ratio_.reset(); }
+  void interrupt() { recent_ratio_.reset(); }
 
   /// Of the whole recording: the mean inlier ratio, and the median correlation while the sensor moved.
   TypicalAgreement overall() const;
@@ -35,19 +35,17 @@ class TypicalAgreementEstimate {
   TypicalAgreement recent() const;
   /// Starts from what an earlier run learnt, worth as much as `pairs` pairs.
   void restore(const TypicalAgreement& typical, std::size_t pairs);
-  std::size_t pairs() const { return inlier_pairs_; }
-  void archive(auto& fields) {
-    fields(correlations_, correlation_pairs_, inlier_pairs_, inlier_ratio_sum_, recent_inlier_ratio_);
-  }
+  std::size_t pairs() const { return ratio_pairs_; }
+  void archive(auto& fields) { fields(correlations_, correlation_pairs_, ratio_pairs_, ratio_sum_, recent_ratio_); }
 
  private:
   void add_correlation(double correlation, std::uint32_t times);
 
   static constexpr int kLastBin = 100;
   std::array<std::uint32_t, kLastBin + 1> correlations_{};  ///< histogram over [0, 1]
-  std::size_t correlation_pairs_ = 0, inlier_pairs_ = 0;
-  double inlier_ratio_sum_ = 0.0;
-  std::optional<double> recent_inlier_ratio_;  ///< running mean
+  std::size_t correlation_pairs_ = 0, ratio_pairs_ = 0;
+  double ratio_sum_ = 0.0;
+  std::optional<double> recent_ratio_;  ///< running mean
 };
 
 }  // namespace revisit

@@ -26,11 +26,11 @@ TEST(TypicalAgreement, HasDefaultsUntilTenPairsAreKnown) {
   TypicalAgreementEstimate estimate;
   const TypicalAgreement defaults;
   for (int i = 0; i < 9; ++i) EXPECT_TRUE(estimate.add(scan_at(i), scan_at(i + 1), planar_pose(0.5, 0, 0)));
-  EXPECT_EQ(estimate.overall().inlier_ratio, defaults.inlier_ratio);
+  EXPECT_EQ(estimate.overall().in_sight_ratio, defaults.in_sight_ratio);
   EXPECT_EQ(estimate.overall().intensity_correlation, defaults.intensity_correlation);
-  EXPECT_NE(estimate.recent().inlier_ratio, defaults.inlier_ratio) << "the last few are known at once";
+  EXPECT_NE(estimate.recent().in_sight_ratio, defaults.in_sight_ratio) << "the last few are known at once";
   estimate.add(scan_at(9), scan_at(10), planar_pose(0.5, 0, 0));
-  EXPECT_NE(estimate.overall().inlier_ratio, defaults.inlier_ratio);
+  EXPECT_NE(estimate.overall().in_sight_ratio, defaults.in_sight_ratio);
   EXPECT_GT(estimate.overall().intensity_correlation, 0.3);
   EXPECT_LE(estimate.overall().intensity_correlation, 1.0);
 }
@@ -44,12 +44,12 @@ TEST(TypicalAgreement, APairAtAWrongPoseIsRefusedAndTeachesNothing) {
 TEST(TypicalAgreement, AfterAnInterruptionOnlyTheOverallOneIsKnown) {
   TypicalAgreementEstimate estimate;
   estimate.restore({0.7, 0.6}, 40);
-  EXPECT_NEAR(estimate.overall().inlier_ratio, 0.7, 1e-9);
+  EXPECT_NEAR(estimate.overall().in_sight_ratio, 0.7, 1e-9);
   EXPECT_NEAR(estimate.overall().intensity_correlation, 0.6, 1e-9);
   estimate.add(scan_at(0), scan_at(1), planar_pose(0.5, 0, 0));
-  EXPECT_GT(estimate.recent().inlier_ratio, 0.8) << "the last pair";
+  EXPECT_GT(estimate.recent().in_sight_ratio, 0.8) << "the last pair";
   estimate.interrupt();
-  EXPECT_NEAR(estimate.recent().inlier_ratio, 0.7, 0.01);
+  EXPECT_NEAR(estimate.recent().in_sight_ratio, 0.7, 0.01);
 }
 
 TEST(TypicalAgreement, IntensitiesThatSayNothingLeaveTheirDefault) {
