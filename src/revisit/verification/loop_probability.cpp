@@ -21,8 +21,8 @@ struct Scale {
 // hidden says nothing: by what has come and gone as often as at another place.
 constexpr Scale kCoarse{{16.69, 3.579, 13.02, -75.88, 13.41, 3.394, 0.0, -24.31},
                         {11.14, 2.589, 0.0, -41.78, 9.628, 2.708, 0.0, -11.81}};
-constexpr Scale kFine{{17.05, 1.939, 10.31, -33.35, 13.06, 5.572, -11.59, -29.76},
-                      {15.35, 1.757, 0.0, -35.66, 13.64, 4.841, -11.19, -19.36}};
+constexpr Scale kFine{{17.22, 1.998, 9.297, -35.09, 11.81, 4.403, -13.37, -28.24},
+                      {16.02, 1.868, 0.0, -37.86, 12.67, 4.126, -13.15, -19.28}};
 // Beyond these, nothing was learnt.
 constexpr double kFarthest_m = 12.0, kMostShare = 1.1, kFewestInliers = 10.0;
 constexpr double kEnoughInliers = 300.0;  // fewer may fit by chance
