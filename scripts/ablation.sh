@@ -3,7 +3,8 @@
 # the first scans of a simulated town. usage: scripts/ablation.sh POSE_FILE OUT [SEED] [SENSOR] [FRAMES] [DIFFICULTY]
 set -euo pipefail
 usage="usage: scripts/ablation.sh POSE_FILE OUT [SEED] [SENSOR] [FRAMES] [DIFFICULTY]"
-poses=$(realpath "${1:?$usage}") out=$(realpath -m "${2:?$usage}") seed=${3:-42} sensor=${4:-hdl64e} frames=${5:-1900} difficulty=${6:-1}
+poses=$(realpath "${1:?$usage}") out=$(realpath -m "${2:?$usage}") seed=${3:-42} sensor=${4:-hdl64e}
+frames=${5:-1900} difficulty=${6:-0}
 cd "$(dirname "$0")/.."
 mkdir -p "$out"
 drive=$out/drive

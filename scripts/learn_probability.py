@@ -100,7 +100,7 @@ def main():
         pairs = [(f.name, of_scale(r, fine)) for f, r in zip(folders, everything)]
         names, recordings = zip(*[(name, r) for name, r in pairs if r is not None])
         for intensity in (True, False):
-            # In the open, what is hidden is hidden by what has changed as often as by another place.
+            # In the open, what came and went since the earlier visit hides as much as another place does.
             columns = [i for i, name in enumerate(NAMES)
                        if (fine or name != "hidden") and (intensity or name != "intensity")]
             slopes, constant = learn(recordings, columns)

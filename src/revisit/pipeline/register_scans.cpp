@@ -19,7 +19,7 @@ constexpr std::size_t kStarts = 6;  // poses from overhead that are registered
 // Who asks how two scans lie to each other believes that they show one place; of candidates for a loop nearly all do
 // not. Rooms, which are thinned finely, fit one another, and themselves turned by 90 degrees.
 constexpr double kPrior_log_odds = 9.0, kPriorOfRooms_log_odds = 3.0;
-// Of consecutive scans' intensities, by sensor .83 to .97: as much as can be asked of one that nobody knows.
+// Of two scans in a row, intensities correlate by .83 (HDL-64E) to .97 (OS0-128); which sensor this is, nobody knows.
 constexpr double kTypicalIntensities = 0.85;
 constexpr double kOther_m = 1.0, kOther_rad = 0.2;  // poses farther apart exclude each other
 

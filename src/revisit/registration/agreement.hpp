@@ -10,11 +10,10 @@ namespace revisit {
 
 /// How well a relative pose explains both scans.
 struct Agreement {
-  double inlier_ratio = 0.0;  ///< smaller of both directions: share of the points above ground with a surface within
-                              ///< reach, among those within the view of the other scan
-  /// The same among those that the other scan could have seen: without what lies behind what it saw there.
-  double in_sight_ratio = 0.0;
-  double hidden_share = 0.0;          ///< larger of both directions: what lies behind it, of those within its view
+  double inlier_ratio = 0.0;    ///< smaller of both directions: share of the points above ground with a surface within
+                                ///< reach, among those within the view of the other scan
+  double in_sight_ratio = 0.0;  ///< the same without hidden points: those behind what the other scan saw
+  double hidden_share = 0.0;    ///< larger of both directions: share of hidden points among those within the view
   double free_space_agreement = 0.0;  ///< smaller of both directions: inliers among these and the points that stand
                                       ///< where the other scan saw through
   std::optional<double> intensity_correlation;  ///< of ranks; smaller of both directions, of inliers and the points

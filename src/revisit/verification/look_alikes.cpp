@@ -15,7 +15,7 @@ struct Tail {
   static constexpr std::size_t kFewestRegistered = 10;     ///< for a tail
   static constexpr double kRare = 1e-3;                    ///< share of the places elsewhere that would reach the end
   static constexpr double kUsualEnd = 3.0;                 ///< of the recordings that the model was learnt on
-  static constexpr double kEndBelowTheLine = 2.0;          ///< in a map: that of min_probability needs no caution
+  static constexpr double kHarmlessEnd = 2.0;              ///< a tail that ends there needs no caution in a map
   static constexpr double kMostCaution = 3.0;              ///< log odds
   static constexpr double kMostTrust = 3.0;                ///< in a map
   static constexpr double kDoubt = 30.0;                   ///< scores by which what is usual counts
@@ -72,7 +72,7 @@ double LookAlikes::correction(bool is_map) const {
   if (!tail) return known * most_trust;
   const double more = Tail::kUsualEnd - end_of_exponential(*tail);
   if (is_map && more < 0.0)
-    return known * std::clamp(Tail::kEndBelowTheLine - end_of_pareto(*tail), -Tail::kMostCaution, 0.0);
+    return known * std::clamp(Tail::kHarmlessEnd - end_of_pareto(*tail), -Tail::kMostCaution, 0.0);
   return known * std::clamp(more, -Tail::kMostCaution, most_trust);
 }
 

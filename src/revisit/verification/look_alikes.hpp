@@ -20,8 +20,8 @@ class LookAlikes {
   double log_odds() const;
 
   /// The same for scores of places that a finished map knows to be elsewhere: where these stay below what other
-  /// recordings have, more than nothing is added. Its places are all known: what they reach at most is where a tail
-  /// with an end has it, while a recording must expect what it has not seen yet.
+  /// recordings have, more than nothing is added. Where they do not, the tail is taken to have an end (generalised
+  /// Pareto), since all places of the map are known; log_odds() must expect places that nobody has seen yet.
   double log_odds_in_map() const;
 
   static constexpr double kNotRegistered = -20.0;

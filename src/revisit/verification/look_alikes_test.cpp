@@ -31,7 +31,7 @@ TEST(LookAlikes, TheMoreWrongPlacesReachTheMoreIsAsked) {
   EXPECT_GE(with_scores(20.0, 3.0, 300).log_odds(), -4.0) << "never so much that nothing passes";
 }
 
-// Scores up to 2 and no farther, as of rows of like houses: an exponential tail would expect 4 and more.
+// Scores up to a limit and none beyond, as of rows of like houses: an exponential tail would expect higher ones.
 TEST(LookAlikes, InAMapWhatIsAlikeHasAnEnd) {
   const auto up_to = [](double most) {
     LookAlikes alike;

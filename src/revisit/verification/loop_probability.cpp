@@ -17,8 +17,8 @@ struct Scale {
   static constexpr double kFine_m = 0.75;
   Coefficients with_intensity, without;
 };
-// What few inliers say in the open is taken from rooms: there are hardly any such pairs to learn from. There, what is
-// hidden says nothing: by what has come and gone as often as at another place.
+// Of scans in the open, `few` is what an earlier set of rooms gave: hardly any such pair is there to learn from.
+// `hidden` is not learnt there: what came and went since the earlier visit hides as much as another place does.
 constexpr Scale kCoarse{{16.69, 3.579, 13.02, -75.88, 13.41, 3.394, 0.0, -24.31},
                         {11.14, 2.589, 0.0, -41.78, 9.628, 2.708, 0.0, -11.81}};
 constexpr Scale kFine{{17.22, 1.998, 9.297, -35.09, 11.81, 4.403, -13.37, -28.24},

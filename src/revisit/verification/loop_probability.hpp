@@ -12,7 +12,7 @@ struct LoopEvidence {
   /// Of what was in sight (Agreement::in_sight_ratio), as a share of what scans lately show of the one before them: in
   /// a field nothing fits well, between shelves everything does.
   double inlier_share = 0.0;
-  double hidden_share = 0.0;          ///< larger of both directions (Agreement)
+  double hidden_share = 0.0;          ///< larger of both directions (Agreement::hidden_share)
   double free_space_agreement = 0.0;  ///< smaller of both directions
   /// Correlation of intensities, as a share of that between consecutive scans; none where intensities say nothing.
   std::optional<double> intensity_agreement;
