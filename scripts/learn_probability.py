@@ -18,7 +18,6 @@ RIGHT_M, RIGHT_DEG = 0.5, 3.0  # docs/evaluation.md
 WRONG_M, WRONG_DEG = 2.0, 10.0  # in between, the place is right and the pose poor: nothing is learnt from it
 NAMES = ["inlier_share", "free_space", "intensity", "rmse", "least_fixed", "few", "hidden"]
 REGULARISED = 2e-2
-FINE_M = 0.75  # below, voxels are those of scans that are thinned finely (docs/method.md, section 7)
 
 
 def matrix(x, y, z, qx, qy, qz, qw):
@@ -33,7 +32,7 @@ def matrix(x, y, z, qx, qy, qz, qw):
 def load(folder):
     """Evidence (one row a registered candidate), whether its pose is right, and its query."""
     poses = [matrix(*row[1:]) for row in np.loadtxt(folder / "poses.tum")]
-    X, right, queries, fine = [], [], [], []
+    X, right, queries, in_the_open = [], [], [], []
     with open(folder / "evidence.csv", encoding="ascii") as stream:
         for row in csv.DictReader(stream):
             free, inliers = float(row["free_space_agreement"]), float(row["inlier_ratio"])
@@ -55,13 +54,13 @@ def load(folder):
                       float(row["hidden_share"]) - 0.03 * distance_m])
             right.append(is_right)
             queries.append(int(row["query"]))
-            fine.append(float(row.get("voxel_m") or 1.0) < FINE_M)
-    return np.array(X), np.array(right), np.array(queries), np.array(fine)
+            in_the_open.append(row["in_the_open"] == "1")
+    return np.array(X), np.array(right), np.array(queries), np.array(in_the_open)
 
 
-def of_scale(recording, fine):
-    """What was thinned finely, or what was not; None where there is too little of it to learn from."""
-    chosen = recording[3] == fine
+def of_world(recording, in_the_open):
+    """Pairs in the open, or those in rooms; None where there are too few of them to learn from."""
+    chosen = recording[3] == in_the_open
     return tuple(each[chosen] for each in recording) if chosen.sum() > 50 else None
 
 
@@ -96,15 +95,15 @@ def main():
     if not folders:
         sys.exit(__doc__)
     everything = [load(f) for f in folders]
-    for fine in (False, True):
-        pairs = [(f.name, of_scale(r, fine)) for f, r in zip(folders, everything)]
+    for in_the_open in (True, False):
+        pairs = [(f.name, of_world(r, in_the_open)) for f, r in zip(folders, everything)]
         names, recordings = zip(*[(name, r) for name, r in pairs if r is not None])
         for intensity in (True, False):
             # In the open, what came and went since the earlier visit hides as much as another place does.
             columns = [i for i, name in enumerate(NAMES)
-                       if (fine or name != "hidden") and (intensity or name != "intensity")]
+                       if (not in_the_open or name != "hidden") and (intensity or name != "intensity")]
             slopes, constant = learn(recordings, columns)
-            print("fine" if fine else "coarse", "with intensity" if intensity else "without",
+            print("open" if in_the_open else "rooms", "with intensity" if intensity else "without",
                   {NAMES[c]: round(float(s), 3) for c, s in zip(columns, slopes)}, "constant", round(constant, 3))
             for i, (name, (X, right, queries, _)) in enumerate(zip(names, recordings)):
                 if len(recordings) == 1:

@@ -181,12 +181,12 @@ TEST(Node, DetectGivesTheLoopsOfTheLibrary) {
   Listener listener;
   // So strict that some loops are confirmed by later ones only.
   Settings settings = settings_of("detect");
-  settings.parameters["geometric.min_probability"] = "0.999999";
+  settings.parameters["geometric.min_probability"] = "0.9999999999";
   EXPECT_EQ(drive(settings, listener, 0, kAll), "");
   Parameters parameters;
   parameters.retrieval.exclude_s = 2.0;
   parameters.retrieval.exclude_frames = 20;
-  parameters.geometric.min_probability = 0.999999;
+  parameters.geometric.min_probability = 0.9999999999;
   std::size_t found_later = 0;
   LoopDetector detector(parameters);
   std::vector<LoopConstraint> expected;

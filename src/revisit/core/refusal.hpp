@@ -16,6 +16,7 @@ struct Refusal {
     kLowOverlap,              ///< seen from overhead
     kTemporallyInconsistent,  ///< the frames before do not match (eq. 11)
     kFewInliers,
+    kSlides,  ///< next to nothing fixes the pose along a wall
     kImprobable,
     kOneNarrowView,  ///< by one scan, of two sensors of which one sees all round and the other one a sector
     kTooFar,         ///< the relative translation

@@ -29,6 +29,8 @@ inline std::string to_text(const Refusal& refusal) {
       return format("temporal consistency %.3f below %.3f", value, limit);
     case Reason::kFewInliers:
       return format("inlier ratio %.2f below %.2f", value, limit);
+    case Reason::kSlides:
+      return format("a wall along which it slides: %.4f of what fixes a pose, below %.4f", value, limit);
     case Reason::kImprobable:
       return format("probability %.3f below %.3f", value, limit);
     case Reason::kOneNarrowView:

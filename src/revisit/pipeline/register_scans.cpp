@@ -17,7 +17,7 @@ namespace {
 constexpr double kReach_m = 12.0;   // scans farther apart share too little
 constexpr std::size_t kStarts = 6;  // poses from overhead that are registered
 // Who asks how two scans lie to each other believes that they show one place; of candidates for a loop nearly all do
-// not. Rooms, which are thinned finely, fit one another, and themselves turned by 90 degrees.
+// not. Rooms fit one another, and themselves turned by 90 degrees.
 constexpr double kPrior_log_odds = 9.0, kPriorOfRooms_log_odds = 3.0;
 // Of two scans in a row, intensities correlate by .83 (HDL-64E) to .97 (OS0-128); which sensor this is, nobody knows.
 constexpr double kTypicalIntensities = 0.85;
@@ -35,7 +35,7 @@ GeometricEvidence register_without_guess(const ThinCloud& target_cloud, const Th
   OverheadSearch search(source_cloud);
   const auto starts = search.search(target_cloud, 0.0, kPi, kReach_m, kStarts);
   const double prior =
-      PairScale(target.surface(), source.surface()).voxel_m < 1.0 ? kPriorOfRooms_log_odds : kPrior_log_odds;
+      PairScale(target.surface(), source.surface()).in_the_open ? kPrior_log_odds : kPriorOfRooms_log_odds;
   std::vector<GeometricEvidence> found(starts.size());
   tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
     CandidateView view;

@@ -307,6 +307,22 @@ TEST(ThinForRegistration, WhatFillsFewVoxelsIsThinnedFiner) {
   EXPECT_EQ(thin_for_registration({}, {}).points.size(), 0u);
 }
 
+TEST(SurfaceCloud, ANarrowViewOfAStreetIsInTheOpen) {
+  const auto wall = [](float from_m, float to_m) {
+    std::vector<Point> points;
+    for (float x = from_m; x < to_m; x += 0.2f)
+      for (float z = -1.f; z < 2.f; z += 0.2f) points.push_back({x, 4.f, z, 0.f});
+    return SurfaceCloud(thin_for_registration(points, {}));
+  };
+  const SurfaceCloud ahead = wall(5.f, 70.f);
+  EXPECT_EQ(ahead.voxel_m(), 0.5) << "few voxels";
+  EXPECT_TRUE(ahead.is_in_the_open());
+  EXPECT_FALSE(wall(-20.f, 40.f).is_in_the_open()) << "a corridor";
+  ThinCloud nothing;
+  nothing.voxel_m = 0.5f;
+  EXPECT_FALSE(SurfaceCloud(nothing).is_in_the_open());
+}
+
 TEST(Agreement, AWallFixesNothingAlongItself) {
   std::vector<Point> wall, corner;
   for (float x = -8.f; x < 8.f; x += 0.2f)

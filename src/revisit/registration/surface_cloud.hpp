@@ -74,6 +74,9 @@ class SurfaceCloud final : public Surface {
   const Eigen::Vector3f& up() const { return cloud_.up; }
   /// Edge of the voxels that the cloud was thinned with.
   double voxel_m() const { return static_cast<double>(cloud_.voxel_m); }
+  /// No room, as far as one scan shows: it fills many voxels, or sees farther than rooms reach. A narrow sensor fills
+  /// few voxels anywhere.
+  bool is_in_the_open() const;
   float intensity(std::size_t i) const { return cloud_.intensity[i]; }
   const SeenSpace& seen() const { return cloud_.seen; }
   const SensorView& view() const { return view_; }

@@ -53,8 +53,7 @@ std::optional<Refusal> refuse_heading(const std::optional<TrajectoryPoint>& plac
 
 double odometry_log_odds(const std::optional<TrajectoryPoint>& place, const std::optional<TrajectoryPoint>& query,
                          const Pose& T_place_query, double unknown_log_odds) {
-  if (!place || !query) return 0.0;
-  if (place->origin != query->origin) return unknown_log_odds;
+  if (!place || !query || place->origin != query->origin) return unknown_log_odds;
   const double off_m = (T_between(*place, *query).inverse() * T_place_query).translation().norm();
   const Apart apart(*place, *query);
   const double deviation_m = std::hypot(Drift::kDeviation_m + Drift::kUsualShare * apart.motion_m, apart.gaps_m);

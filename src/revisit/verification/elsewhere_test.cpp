@@ -48,7 +48,7 @@ TEST(Elsewhere, IsTheLessLikelyTheFartherOdometryIs) {
   EXPECT_DOUBLE_EQ(odometry_log_odds(place, lost, planar_pose(0.0, 0.0, 0.0)), 0.0);
   EXPECT_DOUBLE_EQ(odometry_log_odds(place, lost, planar_pose(0.0, 0.0, 0.0), -3.0), -3.0);
   EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, planar_pose(500.0, 0.0, 0.0), -3.0), 0.0);
-  EXPECT_DOUBLE_EQ(odometry_log_odds(place, std::nullopt, planar_pose(0.0, 0.0, 0.0), -3.0), 0.0) << "a scan alone";
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, std::nullopt, planar_pose(0.0, 0.0, 0.0), -3.0), -3.0) << "a scan alone";
 }
 
 TEST(Elsewhere, WhatGapsAreOffAddsUpAsTheirVariances) {

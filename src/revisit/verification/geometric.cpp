@@ -68,6 +68,7 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
   all.sensors_differ = sensors_differ(match.view(), query.view());
   all.one_is_narrow =
       std::abs(match.view().sector.width_rad - query.view().sector.width_rad) > Differing::kNarrower_rad;
+  all.both_are_narrow = !match.view().sector.is_all_round() && !query.view().sector.is_all_round();
   all.inlier_share =
       agreement.in_sight_ratio / (view.typical.in_sight_ratio * (all.sensors_differ ? Differing::kShare : 1.0));
   all.hidden_share = agreement.hidden_share;
@@ -76,6 +77,7 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
     all.intensity_agreement = *agreement.intensity_correlation / view.typical.intensity_correlation;
   all.rmse_m = agreement.rmse_m;
   all.voxel_m = scale.voxel_m;
+  all.in_the_open = scale.in_the_open;
   all.least_fixed = agreement.least_fixed;
   all.inliers = agreement.inliers;
   all.overlap = view.overlap;

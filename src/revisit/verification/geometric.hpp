@@ -16,9 +16,11 @@ namespace revisit {
 /// What is near and what is exact depends on the voxels that two scans were thinned with, the larger of both. The
 /// probability was learnt with these shares (docs/accuracy.md), so that they are no parameters.
 struct PairScale {
-  PairScale(const SurfaceCloud& a, const SurfaceCloud& b) : voxel_m(std::max(a.voxel_m(), b.voxel_m())) {}
+  PairScale(const SurfaceCloud& a, const SurfaceCloud& b)
+      : voxel_m(std::max(a.voxel_m(), b.voxel_m())), in_the_open(a.is_in_the_open() || b.is_in_the_open()) {}
   double inlier_distance_m() const { return 0.4 * voxel_m; }  ///< farthest point-to-plane distance of an inlier
   double voxel_m;
+  bool in_the_open;
 };
 
 /// What registration says about a candidate.

@@ -77,6 +77,17 @@ TEST(GeometricConsistency, AnotherPlaceIsRefused) {
   }
 }
 
+TEST(GeometricConsistency, WhatSlidesAlongAWallIsRefusedWhateverElseSpeaksForIt) {
+  GeometricEvidence found;
+  found.evidence = {.inlier_ratio = 0.95, .inlier_share = 1.0, .least_fixed = 0.001, .inliers = 1000};
+  decide(found, 0.0, 100.0, {});
+  ASSERT_TRUE(found.refusal);
+  EXPECT_EQ(found.refusal->reason, Refusal::Reason::kSlides);
+  found.evidence.least_fixed = 0.01;
+  decide(found, 0.0, 100.0, {});
+  EXPECT_FALSE(found.refusal);
+}
+
 TEST(GeometricConsistency, TooLongATranslationIsRefused) {
   GeometricEvidence found;
   found.evidence = {.inlier_ratio = 0.95,

@@ -11,18 +11,17 @@ struct Coefficients {
   double inlier_share, free_space, intensity, rmse, least_fixed, few, hidden, constant;
 };
 
-// Learnt by scripts/learn_probability.py: of scans thinned as in the open, and as in rooms and with a narrow view.
-// There, places resemble one another more, and the same measures say less.
-struct Scale {
-  static constexpr double kFine_m = 0.75;
+// Learnt by scripts/learn_probability.py, in the open and in rooms. There, places resemble one another more, and the
+// same measures say less.
+struct Model {
   Coefficients with_intensity, without;
 };
-// Of scans in the open, `few` is what an earlier set of rooms gave: hardly any such pair is there to learn from.
+// In the open, `few` is what an earlier set of rooms gave: hardly any such pair is there to learn from.
 // `hidden` is not learnt there: what came and went since the earlier visit hides as much as another place does.
-constexpr Scale kCoarse{{16.69, 3.579, 13.02, -75.88, 13.41, 3.394, 0.0, -24.31},
-                        {11.14, 2.589, 0.0, -41.78, 9.628, 2.708, 0.0, -11.81}};
-constexpr Scale kFine{{17.22, 1.998, 9.297, -35.09, 11.81, 4.403, -13.37, -28.24},
-                      {16.02, 1.868, 0.0, -37.86, 12.67, 4.126, -13.15, -19.28}};
+constexpr Model kInTheOpen{{16.69, 3.579, 13.02, -75.88, 13.41, 3.394, 0.0, -24.31},
+                           {11.14, 2.589, 0.0, -41.78, 9.628, 2.708, 0.0, -11.81}};
+constexpr Model kInRooms{{17.22, 1.998, 9.297, -35.09, 11.81, 4.403, -13.37, -28.24},
+                         {16.02, 1.868, 0.0, -37.86, 12.67, 4.126, -13.15, -19.28}};
 // Beyond these, nothing was learnt.
 constexpr double kFarthest_m = 12.0, kMostShare = 1.1, kFewestInliers = 10.0;
 constexpr double kEnoughInliers = 300.0;  // fewer may fit by chance
@@ -47,15 +46,13 @@ double log_odds_by(const Coefficients& c, const LoopEvidence& evidence) {
 
 }  // namespace
 
-bool is_in_the_open(const LoopEvidence& evidence) { return evidence.voxel_m >= Scale::kFine_m; }
-
 double loop_log_odds(const LoopEvidence& evidence) {
-  const Scale& scale = is_in_the_open(evidence) ? kCoarse : kFine;
-  if (!evidence.intensity_agreement) return log_odds_by(scale.without, evidence);
-  const double with = log_odds_by(scale.with_intensity, evidence);
+  const Model& model = evidence.in_the_open ? kInTheOpen : kInRooms;
+  if (!evidence.intensity_agreement) return log_odds_by(model.without, evidence);
+  const double with = log_odds_by(model.with_intensity, evidence);
   if (!evidence.sensors_differ) return with;
   // Intensities of two sensors are comparable or not, as likely one as the other: the mean of both odds.
-  const double without = log_odds_by(scale.without, evidence), more = std::max(with, without);
+  const double without = log_odds_by(model.without, evidence), more = std::max(with, without);
   return more + std::log(0.5 * (std::exp(with - more) + std::exp(without - more)));
 }
 

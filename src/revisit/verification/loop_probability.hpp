@@ -18,22 +18,20 @@ struct LoopEvidence {
   std::optional<double> intensity_agreement;
   double rmse_m = 0.0;       ///< point-to-plane, over the inliers
   double voxel_m = 1.0;      ///< edge of the voxels that the scans were thinned with: what lengths are measured against
+  bool in_the_open = true;   ///< SurfaceCloud::is_in_the_open() of either; rooms resemble one another more
   double overlap = 0.0;      ///< of both scans seen from overhead
   double least_fixed = 0.0;  ///< how well the surfaces fix the direction that they fix least (Agreement): a slide
   std::size_t inliers = 0;   ///< points, smaller of both directions
   bool sensors_differ = false;  ///< in what they can see; what their intensities have in common is not known then
   bool one_is_narrow = false;   ///< one of them sees all round, the other one a sector: the rest can contradict nothing
-  double distance_m = 0.0;      ///< between both sensors: farther apart, less fits even at the same place
+  bool both_are_narrow = false;  ///< both see a sector
+  double distance_m = 0.0;       ///< between both sensors: farther apart, less fits even at the same place
 };
 
 /// The log odds that the pose is right (within 0.5 m and 3 degrees), were right and wrong ones equally many: a logistic
 /// model whose coefficients were learnt on recordings that no reported figure uses (docs/accuracy.md says on which and
 /// how). Holds for the shipped voxel size and inlier distance. What is known besides is added (Bayes).
 double loop_log_odds(const LoopEvidence& evidence);
-
-/// Whether both scans were thinned as in the open. Right poses there mostly stand far above the threshold; in rooms and
-/// with few points, all that speaks for one is needed.
-bool is_in_the_open(const LoopEvidence& evidence);
 
 double probability_of(double log_odds);
 

@@ -49,14 +49,14 @@ TEST(LoopProbability, EachPieceOfEvidenceCounts) {
 
 // A room whose door is shut instead of open is another room; in the open, something drove into the way.
 TEST(LoopProbability, WhatIsHiddenCountsInRooms) {
-  const auto log_odds = [](double voxel_m, double hidden_share) {
+  const auto log_odds = [](bool in_the_open, double hidden_share) {
     LoopEvidence evidence = usual_revisit();
-    evidence.voxel_m = voxel_m;
+    evidence.in_the_open = in_the_open;
     evidence.hidden_share = hidden_share;
     return loop_log_odds(evidence);
   };
-  EXPECT_LT(log_odds(0.5, 0.3), log_odds(0.5, 0.05));
-  EXPECT_EQ(log_odds(1.0, 0.3), log_odds(1.0, 0.05));
+  EXPECT_LT(log_odds(false, 0.3), log_odds(false, 0.05));
+  EXPECT_EQ(log_odds(true, 0.3), log_odds(true, 0.05));
 }
 
 TEST(LoopProbability, WithoutIntensitiesGeometryDecides) {
