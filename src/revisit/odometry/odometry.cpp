@@ -92,21 +92,28 @@ OdometryStep Odometry::match(const Scan& scan, double stamp_s, const std::option
     step.compensated = compensated(scan, *step.motion);
     if (first_scan_) begin_map_again(*step.motion);
   }
+  const auto T_guess = T_previous_lidar ? T_previous_lidar : motion_by_imu(stamp_s);
+  using Search = ScanMatcher::Search;
   MatcherScan thinned = matcher_.thinned(step.compensated.empty() ? scan.points : step.compensated);
-  ScanMatch match = matcher_.match(stamp_s, thinned, T_previous_lidar ? T_previous_lidar : motion_by_imu(stamp_s),
-                                   !T_previous_lidar || is_guess);
-  if (is_swept && match.prediction_error_m > Following::kWrong_m) {
-    const Twist found = with_imu(matcher_.motion_found(match.T_previous_found, stamp_s));
-    std::vector<Point> again = compensated(scan, found);
-    if (first_scan_) begin_map_again(found);
-    MatcherScan thinned_again = matcher_.thinned(again);
-    const ScanMatch matched_again = matcher_.match_again(stamp_s, thinned_again, match);
-    if (matched_again.is_tracked) {
-      match = matched_again;
-      step.motion = found;
-      step.compensated = std::move(again);
-      thinned = std::move(thinned_again);
+  ScanMatch match;
+  // A sweep that was compensated wrongly fits badly everywhere: it is compensated again, with the motion that was
+  // found, before it is looked for elsewhere.
+  for (const Search search : {Search::kThere, Search::kAround}) {
+    match = matcher_.match(stamp_s, thinned, T_guess, !T_previous_lidar || is_guess, search);
+    if (is_swept && match.prediction_error_m > Following::kWrong_m) {
+      const Twist found = with_imu(matcher_.motion_found(match.T_previous_found, stamp_s));
+      std::vector<Point> again = compensated(scan, found);
+      if (first_scan_) begin_map_again(found);
+      MatcherScan thinned_again = matcher_.thinned(again);
+      const ScanMatch matched_again = matcher_.match_again(stamp_s, thinned_again, match, search);
+      if (matched_again.is_tracked) {
+        match = matched_again;
+        step.motion = found;
+        step.compensated = std::move(again);
+        thinned = std::move(thinned_again);
+      }
     }
+    if (match.is_tracked) break;
   }
   first_scan_.reset();
   if (!matcher_.has_map() && !step.motion && !scan.times_s.empty()) first_scan_ = scan;

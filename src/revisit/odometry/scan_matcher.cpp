@@ -137,7 +137,7 @@ bool ScanMatcher::is_credible(double matched, double met, bool is_predicted) con
 }
 
 ScanMatch ScanMatcher::match(double stamp_s, const MatcherScan& scan, const std::optional<Pose>& T_previous_lidar,
-                             bool is_guess) const {
+                             bool is_guess, Search search) const {
   const double gap_s = stamp_s - last_stamp_s_;
   const bool extrapolates = motion_ && gap_s > 0.0 && gap_s <= Matching::kLongestExtrapolation_s;
   const Pose T_predicted = T_previous_lidar ? *T_previous_lidar
@@ -145,15 +145,16 @@ ScanMatch ScanMatcher::match(double stamp_s, const MatcherScan& scan, const std:
                                             : Pose::Identity();
   std::optional<double> measured_m;
   if (T_previous_lidar && !is_guess) measured_m = T_previous_lidar->translation().norm();
-  return match_within(map_ ? search_radius_m() : 0.0, stamp_s, scan, T_predicted, measured_m);
+  return match_within(map_ ? search_radius_m() : 0.0, stamp_s, scan, T_predicted, measured_m, search);
 }
 
-ScanMatch ScanMatcher::match_again(double stamp_s, const MatcherScan& scan, const ScanMatch& match) const {
-  return match_within(map_ ? fine_m() : 0.0, stamp_s, scan, match.T_previous_found, match.measured_m);
+ScanMatch ScanMatcher::match_again(double stamp_s, const MatcherScan& scan, const ScanMatch& match,
+                                   Search search) const {
+  return match_within(map_ ? fine_m() : 0.0, stamp_s, scan, match.T_previous_found, match.measured_m, search);
 }
 
 ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const MatcherScan& scan, const Pose& T_predicted,
-                                    std::optional<double> measured_m) const {
+                                    std::optional<double> measured_m, Search search) const {
   ScanMatch match;
   match.measured_m = measured_m;
   match.T_previous_lidar = match.T_previous_found = T_predicted;
@@ -215,7 +216,7 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
   std::vector<Eigen::Vector3f> few;
   double best_of_few = 0.0;
   const auto try_from = [&](const Pose& T_tried, double turn_deg) {
-    if (fits(icp)) return;
+    if (search == Search::kThere || fits(icp)) return;
     if (few.empty())
       for (std::size_t i = 0; i < scan.points.size(); i += 1 + scan.points.size() / (2 * Matching::kFew))
         few.push_back(scan.points[i]);
@@ -241,7 +242,7 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
     if (turn_deg > 0.0) try_from(T_tracked, -turn_deg);
   }
   bool is_tracked = fits(icp);
-  if (!is_tracked && fits_beside_new(near)) {
+  if (!is_tracked && search == Search::kAround && fits_beside_new(near)) {
     icp = near;
     is_tracked = true;
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
@@ -57,13 +58,16 @@ class ScanMatcher {
 
   /// Thins a scan (filtered by range, its sweep compensated).
   MatcherScan thinned(std::span<const Point> points) const;
+  /// Where else a scan is looked for that does not fit where it is predicted.
+  enum class Search : std::uint8_t { kThere, kAround };
   /// Matches the scan with the map. `T_previous_lidar`, if there is one, is the motion since the scan before as wheels
   /// or another odometry measured it: the guess, and the answer where the map gives none. `is_guess`: how far the
   /// sensor went is not measured.
   ScanMatch match(double stamp_s, const MatcherScan& scan, const std::optional<Pose>& T_previous_lidar = {},
-                  bool is_guess = false) const;
+                  bool is_guess = false, Search search = Search::kAround) const;
   /// Matches a scan that was found at `match` once more, after its sweep was compensated with the motion found there.
-  ScanMatch match_again(double stamp_s, const MatcherScan& scan, const ScanMatch& match) const;
+  ScanMatch match_again(double stamp_s, const MatcherScan& scan, const ScanMatch& match,
+                        Search search = Search::kAround) const;
   /// Goes on from there: the scan enters the map, in the background.
   void accept(double stamp_s, const MatcherScan& scan, const ScanMatch& match);
 
@@ -86,7 +90,7 @@ class ScanMatcher {
   class Insertion;
   void wait() const;
   ScanMatch match_within(double radius_m, double stamp_s, const MatcherScan& scan, const Pose& T_predicted,
-                         std::optional<double> measured_m) const;
+                         std::optional<double> measured_m, Search search) const;
   double fine_m() const;
   double search_radius_m() const;
   bool is_credible(double matched, double met, bool is_predicted) const;
