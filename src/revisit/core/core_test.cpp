@@ -12,6 +12,7 @@
 #include <revisit/core/log.hpp>
 #include <revisit/core/loop.hpp>
 #include <revisit/core/put_in_place.hpp>
+#include <revisit/core/refusal_text.hpp>
 #include <revisit/core/result.hpp>
 #include <revisit/core/scan.hpp>
 #include <revisit/core/text.hpp>
@@ -122,6 +123,14 @@ TEST(PutInPlace, ReplacesFilesAndFoldersAndNamesWhatItCannot) {
   ASSERT_FALSE(none);
   EXPECT_NE(none.error().message.find("map: cannot be written: "), std::string::npos) << none.error().message;
   EXPECT_EQ(read("map"), "new");
+}
+
+// They stand in a column of candidates.csv, unquoted.
+TEST(Refusal, TextsHoldNoComma) {
+  for (int reason = 0; reason <= static_cast<int>(Refusal::Reason::kTooFar); ++reason) {
+    const std::string text = to_text({static_cast<Refusal::Reason>(reason), 0.001, 0.002});
+    EXPECT_EQ(text.find(','), std::string::npos) << text;
+  }
 }
 
 TEST(LogSink, SilentWithoutASink) {

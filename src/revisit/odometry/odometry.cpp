@@ -96,8 +96,8 @@ OdometryStep Odometry::match(const Scan& scan, double stamp_s, const std::option
   using Search = ScanMatcher::Search;
   MatcherScan thinned = matcher_.thinned(step.compensated.empty() ? scan.points : step.compensated);
   ScanMatch match;
-  // A sweep that was compensated wrongly fits badly everywhere: it is compensated again, with the motion that was
-  // found, before it is looked for elsewhere.
+  // Before a scan is looked for elsewhere, its sweep is compensated again with the motion that was found, and matched
+  // from there: that match measures how far it slides from where it was found first, not from the prediction.
   for (const Search search : {Search::kThere, Search::kAround}) {
     match = matcher_.match(stamp_s, thinned, T_guess, !T_previous_lidar || is_guess, search);
     if (is_swept && match.prediction_error_m > Following::kWrong_m) {

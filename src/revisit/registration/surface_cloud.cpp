@@ -39,8 +39,8 @@ struct Neighbourhood {
 
 struct Open {
   static constexpr double kVoxel_m = 0.75;  ///< what is thinned more finely fills few voxels
-  /// Of simulated rooms and warehouses the farthest reach 46 m (seeds 866 to 973); a rosette in a street sees beyond in
-  /// three of four scans and more.
+  /// Of simulated rooms and warehouses (seeds 866 to 973) 95 scans in a hundred reach 46 m at most, one 51 m; a rosette
+  /// in a street sees beyond in three of four scans and more.
   static constexpr float kFarthest_m = 50.f;
 };
 
