@@ -354,34 +354,45 @@ TEST(Cli, AFolderThatMayNotBeReadIsNamed) {
   EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
-TEST(Cli, CtrlCLeavesCompleteRows) {
-  const fs::path folder = fresh_folder(), recording = folder / "recording", out = folder / "out";
+// 400 scans of one place.
+fs::path long_wait(const fs::path& recording) {
   fs::create_directories(recording);
-  for (int i = 0; i < 400; ++i) write_scan(recording, i, i < 3 ? scan_at(0.5 * i) : std::vector<Point>());
+  for (int i = 0; i < 3; ++i) write_scan(recording, i, scan_at(0.5 * i));
   for (int i = 3; i < 400; ++i) {
     char name[32];
     std::snprintf(name, sizeof name, "%06d.bin", i);
-    fs::remove(recording / name);
     fs::create_symlink(recording / "000001.bin", recording / name);
   }
+  return recording;
+}
+
+// Runs the program until `file` holds its second row, and interrupts it. The exit code; -1 where it ended before.
+int interrupt_after_a_row(std::vector<std::string> arguments, const fs::path& file) {
   const pid_t child = fork();
   if (child == 0) {
     if (!std::freopen("/dev/null", "w", stderr) || !std::freopen("/dev/null", "w", stdout)) _exit(127);
-    execl(REVISIT_PROGRAM, "revisit", "detect", recording.c_str(), "--out", out.c_str(), "--retrieval.exclude_frames",
-          "2", "--retrieval.exclude_s", "0", static_cast<char*>(nullptr));
+    std::vector<char*> argv;
+    for (std::string& each : arguments) argv.push_back(each.data());
+    argv.push_back(nullptr);
+    execv(REVISIT_PROGRAM, argv.data());
     _exit(127);
   }
-  // As soon as the first answer is written, interrupt.
-  while (!fs::exists(out / "loops.csv") || content(out / "loops.csv").find('\n', 80) == std::string::npos) {
-    int status = 0;
-    ASSERT_EQ(waitpid(child, &status, WNOHANG), 0) << "ended before it could be interrupted";
+  int status = 0;
+  while (!fs::exists(file) || content(file).find('\n', 80) == std::string::npos) {
+    if (waitpid(child, &status, WNOHANG) != 0) return -1;
     usleep(2000);
   }
   kill(child, SIGINT);
-  int status = 0;
   waitpid(child, &status, 0);
-  ASSERT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 130);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+TEST(Cli, CtrlCLeavesCompleteRows) {
+  const fs::path folder = fresh_folder(), recording = long_wait(folder / "recording"), out = folder / "out";
+  ASSERT_EQ(interrupt_after_a_row({"revisit", "detect", recording, "--out", out, "--retrieval.exclude_frames", "2",
+                                   "--retrieval.exclude_s", "0"},
+                                  out / "loops.csv"),
+            130);
   const auto rows = read_candidates(out / "candidates.csv");
   ASSERT_TRUE(rows) << rows.error().message;
   EXPECT_GE(rows->size(), 1u);
@@ -389,6 +400,23 @@ TEST(Cli, CtrlCLeavesCompleteRows) {
   EXPECT_TRUE(read_loops(out / "loops.csv"));
   EXPECT_EQ(content(out / "candidates.csv").back(), '\n');
   EXPECT_NE(content(out / "run.json").find("\"interrupted\": true"), std::string::npos);
+}
+
+TEST(Cli, ComparisonThatIsInterruptedIsJudgedByWhatWasReached) {
+  const fs::path folder = fresh_folder(), recording = long_wait(folder / "recording"), out = folder / "out";
+  std::ofstream poses(folder / "poses.txt");
+  for (int i = 0; i < 400; ++i) poses << "1 0 0 " << std::min(i, 1) * 0.5 << " 0 1 0 0 0 0 1 0\n";
+  poses.close();
+  ASSERT_EQ(interrupt_after_a_row(
+                {"revisit", "compare", recording, "--poses", folder / "poses.txt", "--out", out, "--methods",
+                 "scan-context", "--retrieval.exclude_frames", "2", "--retrieval.exclude_s", "0"},
+                out / "scan-context" / "candidates.csv"),
+            130);
+  const auto rows = read_candidates(out / "scan-context" / "candidates.csv");
+  ASSERT_TRUE(rows) << rows.error().message;
+  const std::string table = content(out / "comparison.csv");
+  const std::string none_missed = "scan-context," + std::to_string(rows->size()) + ",1.000000,";
+  EXPECT_NE(table.find(none_missed), std::string::npos) << table;
 }
 
 TEST(Cli, DescribeDrawsAndInfoTells) {

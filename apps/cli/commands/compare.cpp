@@ -28,23 +28,27 @@ struct CompareOptions {
   ParameterFlags parameters;
 };
 
-// The number of scans that could not be read.
-Result<std::size_t> run_all(Methods& methods, const Recording& recording) {
-  std::size_t skipped = 0;
+struct RunFacts {
+  std::size_t reached = 0, skipped = 0;  ///< scans; skipped: could not be read
+};
+
+Result<RunFacts> run_all(Methods& methods, const Recording& recording) {
+  RunFacts run;
   Progress progress("compare", "scans", recording.size());
   ReadAhead scans(recording);
   for (std::size_t i = 0; i < recording.size() && !interrupted(); ++i) {
+    ++run.reached;
     const auto scan = scans.next();
     progress.update(i + 1);
     if (!scan) {
       progress.clear();
       print_log()(LogLevel::kWarning, scan.error().message + "; skipped");
-      ++skipped;
+      ++run.skipped;
       continue;
     }
     if (const Status status = methods.answer(*scan, i); !status) return status.error();
   }
-  return skipped;
+  return run;
 }
 
 Result<EvaluationReport> evaluate(const fs::path& candidates_file, const std::vector<CandidateRow>& candidates,
@@ -61,12 +65,19 @@ Result<EvaluationReport> evaluate(const fs::path& candidates_file, const std::ve
                           {}};
 }
 
-// Those that ran here, and then those whose answers come from elsewhere.
-Result<std::vector<MethodReport>> evaluate_all(Methods& methods, const Recording& recording,
+Trajectory first_poses(const Recording& recording, std::size_t scans) {
+  Trajectory poses = recording.trajectory();
+  if (scans < recording.size())
+    poses.entries.erase(poses.entries.lower_bound(recording.frame(scans)), poses.entries.end());
+  return poses;
+}
+
+// By the scans that were reached. Those that ran here, and then those whose answers come from elsewhere.
+Result<std::vector<MethodReport>> evaluate_all(Methods& methods, const Recording& recording, std::size_t reached,
                                                const Parameters& parameters, const CompareOptions& options) {
   const EvaluationRules rules{parameters.retrieval};
-  const Reference reference(recording.trajectory(), rules);
-  const auto scans = static_cast<double>(std::max<std::size_t>(1, recording.size()));
+  const Reference reference(first_poses(recording, reached), rules);
+  const auto scans = static_cast<double>(std::max<std::size_t>(1, reached));
   std::vector<MethodReport> reports;
   for (const auto& method : methods.all()) {
     if (const Status status = method->finish(); !status) return status.error();
@@ -138,10 +149,12 @@ int compare(const CompareOptions& options) {
       return fail(status.error());
 
   listen_for_interrupt();
-  const auto skipped = run_all(methods, **recording);
-  if (!skipped) return fail(skipped.error());
-  if (interrupted()) print_log()(LogLevel::kWarning, "interrupted: frames that were not reached count as missed");
-  const auto evaluated = evaluate_all(methods, **recording, *parameters, options);
+  const auto run = run_all(methods, **recording);
+  if (!run) return fail(run.error());
+  if (interrupted())
+    print_log()(LogLevel::kWarning, "interrupted: judged by the first " + std::to_string(run->reached) + " of " +
+                                        std::to_string((*recording)->size()) + " scans");
+  const auto evaluated = evaluate_all(methods, **recording, run->reached, *parameters, options);
   if (!evaluated) return fail(evaluated.error());
   const std::vector<MethodReport>& reports = *evaluated;
   std::cout << to_text(reports);
@@ -158,7 +171,7 @@ int compare(const CompareOptions& options) {
     if (!status) return fail(status.error());
   std::cout << "Picture: " << (out / "precision_recall.png").string() << '\n';
   if (interrupted()) return kInterrupted;
-  return *skipped == 0 ? kDone : kDoneWithReservations;
+  return run->skipped == 0 ? kDone : kDoneWithReservations;
 }
 
 }  // namespace
