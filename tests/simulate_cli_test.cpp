@@ -111,7 +111,7 @@ TEST(SimulateCli, GapsAndDuplicatesOfABagAreToldAndSurvived) {
 
 TEST(SimulateCli, WrongNamesAreErrorsThatTellTheRightOnes) {
   const std::string out = " --out " + (fresh_folder() / "x").string();
-  EXPECT_NE(run("simulate --sensor hdl32e" + out).output.find("allowed: hdl64e, vlp16, os0-128, rosette"),
+  EXPECT_NE(run("simulate --sensor hdl32e" + out).output.find("allowed: hdl64e, vlp16, os0-128, rosette, os1-64, mid360"),
             std::string::npos);
   EXPECT_NE(run("simulate --world moon" + out).output.find("allowed: town, warehouse"), std::string::npos);
   EXPECT_NE(run("simulate --trajectory nowhere.txt" + out).output.find("nowhere.txt: cannot be opened"),

@@ -81,6 +81,7 @@ struct SimulationOptions {
   double beside_m = 0.0;          ///< driven so far to the left of the drive's way
   int frames = 0;                 ///< the first so many scans; 0: all of the drive
   double tilt_deg = 0.0;          ///< how far a sensor carried by hand leans, at most
+  double blind_deg = 0.0;         ///< of the view behind the sensor, hidden by what carries it
   bool motion_distortion = true;  ///< the sensor moves while it sweeps
   bool imu = false;               ///< the sensor has an IMU inside
   bool gps = false;               ///< the vehicle has a GPS receiver

@@ -115,6 +115,17 @@ Eigen::Vector3f Scanner::direction(const Sweep& sweep, std::size_t line, std::si
   if (sensor_.rotates())
     return {cos_elevation_[line] * sweep.cos_azimuth[column], cos_elevation_[line] * sweep.sin_azimuth[column],
             sin_elevation_[line]};
+  if (sensor_.highest_deg > sensor_.lowest_deg) {
+    // Evenly over the dome, each beam far from the ones before (Kronecker's sequence, of the plastic number's powers).
+    const double sweeps = std::round(sweep.time_s / sensor_.sweep_s);
+    const double beam = sweeps * static_cast<double>(sensor_.columns) + static_cast<double>(column);
+    const double azimuth = 2 * kPi * std::fmod(0.7548776662466927 * beam, 1.0);
+    const double elevation = to_radians(sensor_.lowest_deg + (sensor_.highest_deg - sensor_.lowest_deg) *
+                                                                 std::fmod(0.5698402909980532 * beam, 1.0));
+    return Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
+                           std::sin(elevation))
+        .cast<float>();
+  }
   // Two prisms that turn against each other; their phases go on from sweep to sweep, so that none repeats.
   const double time_s = sweep.time_s + static_cast<double>(sweep.offset_s(column, sensor_)) + sensor_.sweep_s;
   const double a = 2 * kPi * 121.567 * time_s, b = -2 * kPi * 77.731 * time_s;
@@ -216,8 +227,12 @@ void Scanner::mix_at_edge(const Return& before, Return& here, std::uint64_t key)
   here.point.x += dice / share * (before.point.x - here.point.x);
 }
 
-// Beams that look down on the vehicle itself come back from too near. A sensor carried by hand has no roof below it.
-bool Scanner::meets_own_roof(const Eigen::Vector3f& direction) const {
+// Beams that look down on the vehicle itself come back from too near, and so do those that meet what stands behind the
+// sensor. A sensor carried by hand has no roof below it.
+bool Scanner::is_hidden_by_carrier(const Eigen::Vector3f& direction) const {
+  if (options_.blind_deg > 0.0 &&
+      std::abs(std::atan2(double{direction.y()}, -double{direction.x()})) < to_radians(0.5 * options_.blind_deg))
+    return true;
   if (direction.z() >= 0.f || options_.tilt_deg > 0.0) return false;
   const float reach = static_cast<float>(sensor_.mast_m) / -direction.z();
   return std::abs(reach * direction.x()) < static_cast<float>(world_.vehicle.half_length_m) &&
@@ -248,7 +263,7 @@ void Scanner::cast(const Sweep& sweep, std::size_t first, std::size_t count, Ret
     for (std::size_t i = 0; i < size; ++i) {
       Return& result = returns[packet + i - first];
       result.is_there = false;
-      if (mets[i].what == Met::What::kNothing || meets_own_roof(in_lidar[i])) {
+      if (mets[i].what == Met::What::kNothing || is_hidden_by_carrier(in_lidar[i])) {
         before.is_there = false;
         continue;
       }

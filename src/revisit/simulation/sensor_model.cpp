@@ -88,7 +88,29 @@ std::vector<SensorModel> make_table() {
   rosette.intensity_scale = 150.0;
   rosette.intensity_step = 1.0;
   rosette.intensity_max = 255.0;
-  return {hdl64, vlp16, os0, rosette};
+
+  SensorModel os1 = os0;
+  os1.name = "os1-64";
+  os1.title = "Ouster OS1-64";
+  os1.elevations_deg = lines(64, 16.6, -16.6);
+  os1.mast_m = 0.4;
+  os1.max_range_m = 120.0;
+  os1.min_range_m = 0.8;
+  os1.range_noise_m = 0.02;
+  os1.range_step_m = 0.003;
+  os1.visible_10_percent_m = 45.0;
+
+  SensorModel dome = rosette;
+  dome.name = "mid360";
+  dome.title = "Livox Mid-360, all round, non-repetitive";
+  dome.columns = 20000;
+  dome.rosette_half_angle_deg = 0.0;
+  dome.lowest_deg = -7.0;
+  dome.highest_deg = 52.0;
+  dome.max_range_m = 70.0;
+  dome.min_range_m = 0.1;
+  dome.visible_10_percent_m = 40.0;
+  return {hdl64, vlp16, os0, rosette, os1, dome};
 }
 
 }  // namespace

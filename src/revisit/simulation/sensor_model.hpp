@@ -15,10 +15,12 @@ struct SensorModel {
   std::string title;  ///< as people call it
   double sweep_s = 0.1;
 
-  // Rotating sensors: lines by columns. Empty elevations: a rosette of `columns` beams a sweep.
-  std::vector<double> elevations_deg;  ///< of each line, from the highest
-  int columns = 0;                     ///< beams of a line in one turn; all beams of a rosette
-  double rosette_half_angle_deg = 0.0;
+  // Rotating sensors: lines by columns. Empty elevations: `columns` beams a sweep that never repeat, in a circle ahead
+  // (rosette) or all round (dome).
+  std::vector<double> elevations_deg;          ///< of each line, from the highest
+  int columns = 0;                             ///< beams of a line in one turn; all beams of a rosette or dome
+  double rosette_half_angle_deg = 0.0;         ///< 0: a dome
+  double lowest_deg = 0.0, highest_deg = 0.0;  ///< of a dome
 
   double mast_m = 0.3;  ///< from the vehicle's roof up to the sensor
   double min_range_m = 0.5, max_range_m = 120.0;

@@ -95,7 +95,8 @@ Result<std::unique_ptr<SimulatedRecording>> simulate(const SimulationOptions& op
   parts->size = parts->world.path.knots().size();
   if (options.frames > 0) parts->size = std::min(parts->size, static_cast<std::size_t>(options.frames));
   parts->scanner = std::make_unique<Scanner>(
-      parts->world, *sensor, Scanner::Options{options.tilt_deg, options.motion_distortion, threads, ""});
+      parts->world, *sensor,
+      Scanner::Options{options.tilt_deg, options.blind_deg, options.motion_distortion, threads, ""});
   for (std::size_t i = 0; i < parts->size; ++i) {
     const double stamp_s = Path::kStep_s * static_cast<double>(i);
     parts->truth.entries[FrameId{static_cast<std::int64_t>(i)}] = {stamp_s, parts->scanner->T_world_lidar(stamp_s)};

@@ -16,7 +16,7 @@ namespace revisit::simulation_internal {
 class Scanner {
  public:
   struct Options {
-    double tilt_deg = 0.0;
+    double tilt_deg = 0.0, blind_deg = 0.0;
     bool motion_distortion = true;
     int threads = 0;  ///< 0: all
     std::string embree_options;
@@ -42,7 +42,7 @@ class Scanner {
                  std::uint64_t key) const;
   void mix_at_edge(const Return& before, Return& here, std::uint64_t key) const;
   Hit look_at(const Sweep& sweep, const Ray& ray, const Met& met) const;
-  bool meets_own_roof(const Eigen::Vector3f& direction) const;
+  bool is_hidden_by_carrier(const Eigen::Vector3f& direction) const;
   double falloff_at(double range_m) const;
   Met expect(const Ray& ray, const Met& neighbour) const;
 
