@@ -28,16 +28,16 @@ struct CompareOptions {
   ParameterFlags parameters;
 };
 
-struct RunFacts {
-  std::size_t reached = 0, skipped = 0;  ///< scans; skipped: could not be read
+struct Reached {
+  std::size_t scans = 0, skipped = 0;  ///< scans; skipped: could not be read
 };
 
-Result<RunFacts> run_all(Methods& methods, const Recording& recording) {
-  RunFacts run;
+Result<Reached> run_all(Methods& methods, const Recording& recording) {
+  Reached run;
   Progress progress("compare", "scans", recording.size());
   ReadAhead scans(recording);
   for (std::size_t i = 0; i < recording.size() && !interrupted(); ++i) {
-    ++run.reached;
+    ++run.scans;
     const auto scan = scans.next();
     progress.update(i + 1);
     if (!scan) {
@@ -152,9 +152,9 @@ int compare(const CompareOptions& options) {
   const auto run = run_all(methods, **recording);
   if (!run) return fail(run.error());
   if (interrupted())
-    print_log()(LogLevel::kWarning, "interrupted: judged by the first " + std::to_string(run->reached) + " of " +
+    print_log()(LogLevel::kWarning, "interrupted: judged by the first " + std::to_string(run->scans) + " of " +
                                         std::to_string((*recording)->size()) + " scans");
-  const auto evaluated = evaluate_all(methods, **recording, run->reached, *parameters, options);
+  const auto evaluated = evaluate_all(methods, **recording, run->scans, *parameters, options);
   if (!evaluated) return fail(evaluated.error());
   const std::vector<MethodReport>& reports = *evaluated;
   std::cout << to_text(reports);

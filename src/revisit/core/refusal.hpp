@@ -16,9 +16,9 @@ struct Refusal {
     kLowOverlap,              ///< seen from overhead
     kTemporallyInconsistent,  ///< the frames before do not match (eq. 11)
     kFewInliers,
-    kSlides,  ///< next to nothing fixes the pose along a wall
+    kSlides,  ///< the surfaces hardly fix the position along one direction: its standard deviation, metres
     kImprobable,
-    kOneNarrowView,  ///< by one scan, of two sensors of which one sees all round and the other one a sector
+    kOneNarrowView,  ///< by one scan of a sector, which may be that of another street
     kTooFar,         ///< the relative translation
   };
   Reason reason = Reason::kNoCandidate;

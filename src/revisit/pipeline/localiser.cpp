@@ -27,7 +27,7 @@ struct Staying {
 };
 
 struct Waking {
-  static constexpr double kNarrowView_log_odds = 2.0;  ///< what a scan counts at most where one sensor sees a sector
+  static constexpr double kNarrowView_log_odds = 2.0;  ///< what a scan counts at most that does not decide alone
 };
 
 struct Nearby {
@@ -59,7 +59,7 @@ void ask_for_more_of_narrow_views(Detection& detection) {
   if (!detection.loop) return;
   const auto registered = std::find_if(detection.registered.begin(), detection.registered.end(),
                                        [&](const auto& each) { return each.match == detection.loop->match; });
-  if (registered == detection.registered.end() || !registered->evidence.evidence.one_is_narrow) return;
+  if (registered == detection.registered.end() || registered->evidence.evidence.decides_alone()) return;
   detection.refusal = Refusal{Refusal::Reason::kOneNarrowView, detection.loop->probability, 0.0};
   detection.loop.reset();
 }
@@ -217,9 +217,9 @@ Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const Trajecto
   for (const Detection::Registered& each : detection->registered) {
     const Pose T_map_lidar = map_.T_map_lidar(each.match) * each.evidence.T_match_query;
     const int part = map_.part(each.match);
-    const double log_odds = each.evidence.evidence.one_is_narrow
-                                ? std::min(each.evidence.own_log_odds, Waking::kNarrowView_log_odds)
-                                : each.evidence.own_log_odds;
+    const double log_odds = each.evidence.evidence.decides_alone()
+                                ? each.evidence.own_log_odds
+                                : std::min(each.evidence.own_log_odds, Waking::kNarrowView_log_odds);
     sightings.push_back({each.match, part, T_map_lidar, log_odds, expectation_log_odds(T_map_lidar, part, point)});
   }
   belief_.add(point, sightings);

@@ -237,4 +237,12 @@ IcpResult align_icp(const Surface& target, std::span<const Eigen::Vector3f> sour
   return result;
 }
 
+double largest_stddev_m(const Matrix6& information) {
+  const Eigen::LLT<Matrix6> factor(information);
+  if (factor.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
+  const Matrix6 covariance = factor.solve(Matrix6::Identity());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(covariance.topLeftCorner<3, 3>(), Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, axes.eigenvalues()(2)));
+}
+
 }  // namespace revisit

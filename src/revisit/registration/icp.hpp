@@ -45,4 +45,8 @@ struct IcpOptions {
 IcpResult align_icp(const Surface& target, std::span<const Eigen::Vector3f> source, const Pose& T_guess_target_source,
                     const IcpOptions& options = {});
 
+/// Standard deviation of the position along the direction in which it is largest, metres; infinite where nothing fixes
+/// one of them. `information` is an inverse covariance as in IcpResult.
+double largest_stddev_m(const Matrix6& information);
+
 }  // namespace revisit

@@ -4,9 +4,9 @@
 namespace revisit {
 namespace {
 
-// What normals that are off by two degrees and a half show of a direction that nothing faces. Of a Livox along real
-// walls, right loops have .005 and more.
-constexpr double kLeastFixed = 0.002;
+// Beyond, one pose in ten is more than 0.5 m off: points share the errors of their surfaces (docs/accuracy.md, "How
+// well a position is fixed").
+constexpr double kMostStddev_m = 0.1;
 constexpr double kMostTranslation_m = 15.0;  // beyond, scans share too little to be right
 
 std::optional<Refusal> refusal_of(const GeometricEvidence& found, const GeometricOptions& options) {
@@ -14,9 +14,9 @@ std::optional<Refusal> refusal_of(const GeometricEvidence& found, const Geometri
   const LoopEvidence& evidence = found.evidence;
   if (evidence.inlier_ratio < options.min_inlier_ratio)
     return Refusal{Reason::kFewInliers, evidence.inlier_ratio, options.min_inlier_ratio};
-  if (evidence.least_fixed < kLeastFixed) return Refusal{Reason::kSlides, evidence.least_fixed, kLeastFixed};
   if (found.probability < options.min_probability)
     return Refusal{Reason::kImprobable, found.probability, options.min_probability};
+  if (evidence.stddev_m > kMostStddev_m) return Refusal{Reason::kSlides, evidence.stddev_m, kMostStddev_m};
   if (evidence.distance_m > kMostTranslation_m)
     return Refusal{Reason::kTooFar, evidence.distance_m, kMostTranslation_m};
   return std::nullopt;

@@ -23,15 +23,6 @@ const double kYawMargin_rad = to_radians(3.0);
 // tree for tree, wrong ones reach 3.2 by themselves (OS0-128 and rosette along 08, seed 304). With 3 less in rooms, 242
 // of a rosette's 349 loops on the storeys of a building were false; with 6 less none (docs/accuracy.md).
 constexpr double kUnknownInTheOpen_log_odds = -3.0, kUnknownInRooms_log_odds = -6.0;
-// The same between sessions, and in a map, where both scans see a sector of a street. Chosen on seed 171, where 4 of
-// 1,447 scans of another town were answered without; it is not enough everywhere (docs/maps.md).
-constexpr double kUnknownSector_log_odds = -3.0;
-
-double unknown_log_odds(const LoopEvidence& evidence, bool was_lost) {
-  if (was_lost) return evidence.in_the_open ? kUnknownInTheOpen_log_odds : kUnknownInRooms_log_odds;
-  return evidence.in_the_open && evidence.both_are_narrow ? kUnknownSector_log_odds : 0.0;
-}
-
 }  // namespace
 
 CandidateRegistration::CandidateRegistration(const VerificationContext& context, const VerificationQuery& query)
@@ -167,8 +158,9 @@ void CandidateRegistration::register_scans(Hypothesis& hypothesis, const PosePre
     support = std::max(support, LoopFollowing::carried(prediction->log_odds, 0.0));
   const bool was_lost = context_.is_one_drive && place && query_.trajectory_point &&
                         session_of(hypothesis.candidate.match) == session_of(query_.frame);
-  const double unknown = unknown_log_odds(hypothesis.geometric->evidence, was_lost);
-  if (options_.follow) support += odometry_log_odds(place, query_.trajectory_point, found, unknown);
+  const double lost =
+      hypothesis.geometric->evidence.in_the_open ? kUnknownInTheOpen_log_odds : kUnknownInRooms_log_odds;
+  if (options_.follow) support += odometry_log_odds(place, query_.trajectory_point, found, was_lost ? lost : 0.0);
   decide(*hypothesis.geometric, context_.look_alikes_log_odds, support, options_);
   if (options_.follow && hypothesis.geometric->is_consistent())
     hypothesis.geometric->refusal = refuse_heading(place, query_.trajectory_point, found);

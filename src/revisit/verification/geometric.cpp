@@ -35,6 +35,7 @@ struct Refinement {
 struct Differing {
   static constexpr double kDown = 1.5, kDownALittle = 1.15, kUp = 3.0;  ///< ratios of slopes
   static constexpr float kNarrower_rad = 1.05f;                         ///< of the sectors that they see
+  static constexpr float kHalfOfAll_rad = 3.14f;                        ///< both sectors are narrow below
   /// Of what fits between two scans of one sensor: each thins what it sees by where its own lines lie.
   static constexpr double kShare = 0.8;
 };
@@ -68,7 +69,8 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
   all.sensors_differ = sensors_differ(match.view(), query.view());
   all.one_is_narrow =
       std::abs(match.view().sector.width_rad - query.view().sector.width_rad) > Differing::kNarrower_rad;
-  all.both_are_narrow = !match.view().sector.is_all_round() && !query.view().sector.is_all_round();
+  all.both_are_narrow =
+      std::max(match.view().sector.width_rad, query.view().sector.width_rad) < Differing::kHalfOfAll_rad;
   all.inlier_share =
       agreement.in_sight_ratio / (view.typical.in_sight_ratio * (all.sensors_differ ? Differing::kShare : 1.0));
   all.hidden_share = agreement.hidden_share;
@@ -80,6 +82,7 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
   all.in_the_open = scale.in_the_open;
   all.least_fixed = agreement.least_fixed;
   all.inliers = agreement.inliers;
+  all.stddev_m = largest_stddev_m(icp.information);
   all.overlap = view.overlap;
   all.distance_m = icp.T_target_source.translation().norm();
   decide(evidence, 0.0, 0.0, options);

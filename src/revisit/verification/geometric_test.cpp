@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/verification/geometric.hpp>
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include <revisit/verification/acceptance.hpp>
@@ -77,15 +79,31 @@ TEST(GeometricConsistency, AnotherPlaceIsRefused) {
   }
 }
 
-TEST(GeometricConsistency, WhatSlidesAlongAWallIsRefusedWhateverElseSpeaksForIt) {
+TEST(GeometricConsistency, WhatMaySlideIsRefusedWhateverElseSpeaksForIt) {
   GeometricEvidence found;
-  found.evidence = {.inlier_ratio = 0.95, .inlier_share = 1.0, .least_fixed = 0.001, .inliers = 1000};
+  found.evidence = {
+      .inlier_ratio = 0.95, .inlier_share = 1.0, .intensity_agreement = 1.0, .inliers = 1000, .stddev_m = 0.15};
   decide(found, 0.0, 100.0, {});
   ASSERT_TRUE(found.refusal);
   EXPECT_EQ(found.refusal->reason, Refusal::Reason::kSlides);
-  found.evidence.least_fixed = 0.01;
+  found.evidence.stddev_m = 0.08;
   decide(found, 0.0, 100.0, {});
   EXPECT_FALSE(found.refusal);
+}
+
+TEST(GeometricConsistency, HowWellThePositionIsFixedGoesByWhatIsLeastFixed) {
+  const auto stddev_m = [](bool with_end) {
+    std::vector<Point> points;
+    for (float x = -20.f; x <= 15.f; x += 0.25f)
+      for (float z = 0.f; z <= 3.f; z += 0.25f)
+        for (const float y : {-2.f, 2.f}) points.push_back({x, y + 0.02f * std::sin(40.f * x + 17.f * z), z, 0.f});
+    for (float y = -2.f; with_end && y <= 2.f; y += 0.25f)
+      for (float z = 0.f; z <= 3.f; z += 0.25f) points.push_back({15.f, y, z, 0.f});
+    ScanGeometry corridor{thin(points, {}, 0.5)};
+    return check_geometric(corridor, corridor, {planar_pose(0, 0, 0.0)}, {}).evidence.stddev_m;
+  };
+  EXPECT_LT(stddev_m(true), 0.15);
+  EXPECT_GT(stddev_m(false), 3.0 * stddev_m(true)) << "nothing but noise fixes the way along the corridor";
 }
 
 TEST(GeometricConsistency, TooLongATranslationIsRefused) {

@@ -24,8 +24,12 @@ struct LoopEvidence {
   std::size_t inliers = 0;   ///< points, smaller of both directions
   bool sensors_differ = false;  ///< in what they can see; what their intensities have in common is not known then
   bool one_is_narrow = false;   ///< one of them sees all round, the other one a sector: the rest can contradict nothing
-  bool both_are_narrow = false;  ///< both see a sector
+  bool both_are_narrow = false;  ///< both see less than half of what is around
+  double stddev_m = 0.0;         ///< of the position along the direction that is known least, by the pose's information
   double distance_m = 0.0;       ///< between both sensors: farther apart, less fits even at the same place
+
+  /// Where nothing else is known of both scans: a sector of a street may be that of another one.
+  bool decides_alone() const { return !one_is_narrow && !(both_are_narrow && in_the_open); }
 };
 
 /// The log odds that the pose is right (within 0.5 m and 3 degrees), were right and wrong ones equally many: a logistic

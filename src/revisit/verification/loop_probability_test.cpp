@@ -38,6 +38,7 @@ TEST(LoopProbability, EachPieceOfEvidenceCounts) {
   };
   EXPECT_LT(after([](LoopEvidence& e) { e.inlier_share -= 0.1; }), before);
   EXPECT_LT(after([](LoopEvidence& e) { e.one_is_narrow = true; }), before);
+  EXPECT_LT(after([](LoopEvidence& e) { e.both_are_narrow = true; }), before) << "other streets fit, too";
   EXPECT_LT(after([](LoopEvidence& e) { e.free_space_agreement -= 0.02; }), before);
   EXPECT_LT(after([](LoopEvidence& e) { *e.intensity_agreement -= 0.1; }), before);
   EXPECT_LT(after([](LoopEvidence& e) { e.rmse_m += 0.02; }), before);
@@ -45,6 +46,17 @@ TEST(LoopProbability, EachPieceOfEvidenceCounts) {
   EXPECT_LT(after([](LoopEvidence& e) { e.least_fixed = 0.01; }), before - 1.0) << "it may slide along a wall";
   EXPECT_LT(after([](LoopEvidence& e) { e.inliers = 100; }), before - 1.0) << "few points may fit by chance";
   EXPECT_GT(after([](LoopEvidence& e) { e.distance_m += 4.0; }), before) << "from afar less must fit";
+}
+
+TEST(LoopProbability, ASectorOfAStreetDecidesNothingAlone) {
+  LoopEvidence evidence = usual_revisit();
+  EXPECT_TRUE(evidence.decides_alone());
+  evidence.both_are_narrow = true;
+  EXPECT_FALSE(evidence.decides_alone());
+  evidence.in_the_open = false;
+  EXPECT_TRUE(evidence.decides_alone()) << "a room has a sector of its own";
+  evidence.one_is_narrow = true;
+  EXPECT_FALSE(evidence.decides_alone());
 }
 
 // A room whose door is shut instead of open is another room; in the open, something drove into the way.
