@@ -12,6 +12,7 @@ describe() {  # NAME WORLD SENSOR FRAME TITLE
 describe hdl64e town hdl64e 500 50
 describe vlp16 town vlp16 500 50
 describe os0-128 town os0-128 500 50
+describe mid360 town mid360 500 50
 describe rosette town rosette 500 50
 describe warehouse warehouse vlp16 400 30
 if [ -d "$kitti" ]; then

@@ -111,8 +111,9 @@ TEST(SimulateCli, GapsAndDuplicatesOfABagAreToldAndSurvived) {
 
 TEST(SimulateCli, WrongNamesAreErrorsThatTellTheRightOnes) {
   const std::string out = " --out " + (fresh_folder() / "x").string();
-  EXPECT_NE(run("simulate --sensor hdl32e" + out).output.find("allowed: hdl64e, vlp16, os0-128, rosette, os1-64, mid360"),
-            std::string::npos);
+  EXPECT_NE(
+      run("simulate --sensor hdl32e" + out).output.find("allowed: hdl64e, vlp16, os0-128, rosette, os1-64, mid360"),
+      std::string::npos);
   EXPECT_NE(run("simulate --world moon" + out).output.find("allowed: town, warehouse"), std::string::npos);
   EXPECT_NE(run("simulate --trajectory nowhere.txt" + out).output.find("nowhere.txt: cannot be opened"),
             std::string::npos);
@@ -120,6 +121,14 @@ TEST(SimulateCli, WrongNamesAreErrorsThatTellTheRightOnes) {
   EXPECT_EQ(lean.code, 2);
   EXPECT_NE(lean.output.find("allowed: 0 to 40"), std::string::npos) << lean.output;
   EXPECT_FALSE(fs::exists(fresh_folder() / "x"));
+}
+
+TEST(SimulateCli, InfoKnowsADomeFromAScanWithoutRings) {
+  const fs::path spec = fresh_folder() / "dome.toml";
+  std::ofstream(spec) << "[simulation]\nsensor = \"mid360\"\nframes = 3\nlength_m = 100\n";
+  const auto info = run("info " + spec.string());
+  EXPECT_EQ(info.code, 0) << info.output;
+  EXPECT_NE(info.output.find("Mid-360 or alike"), std::string::npos) << info.output;
 }
 
 TEST(SimulateCli, ParameterFilesQuoteTexts) {

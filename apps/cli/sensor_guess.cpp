@@ -47,7 +47,9 @@ SensorGuess guess_sensor(const Scan& scan, const Rings& rings) {
     return guess;
   }
   if (rings.source == RingSource::kNone) {
-    guess.name = "unknown: turns about, but no rings were found (a merged or thinned scan?)";
+    const bool is_dome = std::abs(guess.lowest_deg + 7.0) < 3.0 && std::abs(guess.highest_deg - 52.0) < 3.0;
+    guess.name = is_dome ? "Mid-360 or alike: all round, non-repetitive"
+                         : "unknown: turns about, but no rings were found (a merged or thinned scan?)";
     return guess;
   }
   // The outermost rings, not points: vehicles that tilt and corrected scans smear the extremes.
