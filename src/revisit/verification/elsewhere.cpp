@@ -12,7 +12,7 @@ struct Drift {
   static constexpr double kShare = 0.06;                            ///< of the motion in between
   static constexpr double kMetresARadian = 2.0;                     ///< a turn brings as much drift as so many metres
   static constexpr double kPose_m = 1.0;                            ///< of registered poses
-  static constexpr double kDeviation_m = 1.0, kUsualShare = 0.005;  ///< what is usual
+  static constexpr double kDeviation_m = 0.5, kUsualShare = 0.005;  ///< what is usual
   static constexpr double kMostDeviations = 3.0;                    ///< more is never off
   static constexpr double kNever_log_odds = 20.0;
   static constexpr double kShareToLearn = 0.03;
