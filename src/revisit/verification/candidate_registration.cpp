@@ -158,9 +158,11 @@ void CandidateRegistration::register_scans(Hypothesis& hypothesis, const PosePre
     support = std::max(support, LoopFollowing::carried(prediction->log_odds, 0.0));
   const bool was_lost = context_.is_one_drive && place && query_.trajectory_point &&
                         session_of(hypothesis.candidate.match) == session_of(query_.frame);
-  const double lost =
-      hypothesis.geometric->evidence.in_the_open ? kUnknownInTheOpen_log_odds : kUnknownInRooms_log_odds;
-  if (options_.follow) support += odometry_log_odds(place, query_.trajectory_point, found, was_lost ? lost : 0.0);
+  const LoopEvidence& evidence = hypothesis.geometric->evidence;
+  const double lost = evidence.in_the_open ? kUnknownInTheOpen_log_odds : kUnknownInRooms_log_odds;
+  if (options_.follow)
+    support +=
+        odometry_log_odds(place, query_.trajectory_point, found, evidence.both_are_narrow, was_lost ? lost : 0.0);
   decide(*hypothesis.geometric, context_.look_alikes_log_odds, support, options_);
   if (options_.follow && hypothesis.geometric->is_consistent())
     hypothesis.geometric->refusal = refuse_heading(place, query_.trajectory_point, found);

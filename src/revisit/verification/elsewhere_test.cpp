@@ -43,21 +43,24 @@ TEST(Elsewhere, IsWhatLooksTheSameTurned) {
 TEST(Elsewhere, IsTheLessLikelyTheFartherOdometryIs) {
   const TrajectoryPoint place{.segment = 1, .origin = 1};
   const TrajectoryPoint query = place.after(planar_pose(500.0, 0.0, 0.0));  // a deviation of 3 m
-  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, planar_pose(500.0, 0.0, 0.0)), 0.0);
-  EXPECT_NEAR(odometry_log_odds(place, query, planar_pose(497.0, 0.0, 0.0)), -0.5, 1e-9);
-  EXPECT_NEAR(odometry_log_odds(place, query, planar_pose(494.0, 0.0, 0.0)), -2.0, 1e-9);
-  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, planar_pose(490.5, 0.0, 0.0)), -20.0) << "more than three of them";
-  EXPECT_DOUBLE_EQ(odometry_log_odds(place, lost, planar_pose(0.0, 0.0, 0.0)), 0.0);
-  EXPECT_DOUBLE_EQ(odometry_log_odds(place, lost, planar_pose(0.0, 0.0, 0.0), -3.0), -3.0);
-  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, planar_pose(500.0, 0.0, 0.0), -3.0), 0.0);
-  EXPECT_DOUBLE_EQ(odometry_log_odds(place, std::nullopt, planar_pose(0.0, 0.0, 0.0), -3.0), -3.0) << "a scan alone";
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, planar_pose(500.0, 0.0, 0.0), false), 0.0);
+  EXPECT_NEAR(odometry_log_odds(place, query, planar_pose(497.0, 0.0, 0.0), false), -0.5, 1e-9);
+  EXPECT_NEAR(odometry_log_odds(place, query, planar_pose(494.0, 0.0, 0.0), false), -2.0, 1e-9);
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, planar_pose(490.5, 0.0, 0.0), false), -20.0)
+      << "more than three of them";
+  EXPECT_NEAR(odometry_log_odds(place, query, planar_pose(495.5, 0.0, 0.0), true), -0.5, 1e-9) << "of a sector: 4.5 m";
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, lost, planar_pose(0.0, 0.0, 0.0), false), 0.0);
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, lost, planar_pose(0.0, 0.0, 0.0), false, -3.0), -3.0);
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, planar_pose(500.0, 0.0, 0.0), false, -3.0), 0.0);
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, std::nullopt, planar_pose(0.0, 0.0, 0.0), false, -3.0), -3.0)
+      << "a scan alone";
 }
 
 TEST(Elsewhere, WhatGapsAreOffAddsUpAsTheirVariances) {
   const TrajectoryPoint place{.segment = 1, .origin = 1};
   TrajectoryPoint query = place;
   for (int gap = 0; gap < 9; ++gap) query = query.after_gap(Pose::Identity(), 0.5);
-  EXPECT_NEAR(odometry_log_odds(place, query, planar_pose(std::sqrt(2.5), 0.0, 0.0)), -0.5, 1e-9)
+  EXPECT_NEAR(odometry_log_odds(place, query, planar_pose(std::sqrt(2.5), 0.0, 0.0), false), -0.5, 1e-9)
       << "0.5 m, and 1.5 m of nine gaps";
 }
 
