@@ -29,7 +29,7 @@ struct CompareOptions {
 };
 
 struct Reached {
-  std::size_t scans = 0, skipped = 0;  ///< scans; skipped: could not be read
+  std::size_t scans = 0, skipped = 0;  ///< skipped: could not be read
 };
 
 Result<Reached> run_all(Methods& methods, const Recording& recording) {

@@ -30,7 +30,7 @@ inline std::string to_text(const Refusal& refusal) {
     case Reason::kFewInliers:
       return format("inlier ratio %.2f below %.2f", value, limit);
     case Reason::kSlides:
-      return format("slides: along one direction known to %.2f m; more than %.2f m", value, limit);
+      return format("position uncertain by %.2f m: more than %.2f m", value, limit);
     case Reason::kImprobable:
       return format("probability %.3f below %.3f", value, limit);
     case Reason::kOneNarrowView:

@@ -115,8 +115,8 @@ Eigen::Vector3f Scanner::direction(const Sweep& sweep, std::size_t line, std::si
   if (sensor_.rotates())
     return {cos_elevation_[line] * sweep.cos_azimuth[column], cos_elevation_[line] * sweep.sin_azimuth[column],
             sin_elevation_[line]};
-  if (sensor_.highest_deg > sensor_.lowest_deg) {
-    // Evenly over the dome, each beam far from the ones before (Kronecker's sequence, of the plastic number's powers).
+  if (sensor_.is_dome()) {
+    // Evenly over the dome, each beam far from the ones before (the Kronecker sequence of the plastic number).
     const double sweeps = std::round(sweep.time_s / sensor_.sweep_s);
     const double beam = sweeps * static_cast<double>(sensor_.columns) + static_cast<double>(column);
     const double azimuth = 2 * kPi * std::fmod(0.7548776662466927 * beam, 1.0);

@@ -40,6 +40,7 @@ struct SensorModel {
   double intensity_max = 1.0;     ///< larger readings saturate
 
   bool rotates() const { return !elevations_deg.empty(); }
+  bool is_dome() const { return highest_deg > lowest_deg; }
   std::size_t beams() const { return static_cast<std::size_t>(columns) * (rotates() ? elevations_deg.size() : 1); }
 };
 

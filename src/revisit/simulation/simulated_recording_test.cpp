@@ -103,7 +103,7 @@ TEST(Simulation, EverySensorKeepsToItsTable) {
     SCOPED_TRACE(sensor.name);
     const auto recording = make(small("town", sensor.name));
     const Scan scan = *recording->read(30);
-    EXPECT_GT(scan.points.size(), sensor.beams() / (sensor.highest_deg > 0.0 ? 6 : 3)) << "a dome sees much sky";
+    EXPECT_GT(scan.points.size(), sensor.beams() / (sensor.is_dome() ? 6 : 3)) << "a dome sees much sky";
     EXPECT_LE(scan.points.size(), sensor.beams());
     EXPECT_EQ(scan.rings.size(), sensor.rotates() ? scan.points.size() : 0u);
     ASSERT_EQ(scan.times_s.size(), scan.points.size());
@@ -123,7 +123,7 @@ TEST(Simulation, EverySensorKeepsToItsTable) {
       if (sensor.rotates()) {
         const double elevation = to_degrees(std::asin(p.z / range_m));
         ASSERT_NEAR(elevation, sensor.elevations_deg[scan.rings[i]], 0.01);
-      } else if (sensor.highest_deg > 0.0) {
+      } else if (sensor.is_dome()) {
         const double elevation = to_degrees(std::asin(p.z / range_m));
         ASSERT_GE(elevation, sensor.lowest_deg - 1e-3);
         ASSERT_LE(elevation, sensor.highest_deg + 1e-3);

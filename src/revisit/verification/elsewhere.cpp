@@ -13,8 +13,8 @@ struct Drift {
   static constexpr double kMetresARadian = 2.0;                     ///< a turn brings as much drift as so many metres
   static constexpr double kPose_m = 1.0;                            ///< of registered poses
   static constexpr double kDeviation_m = 0.5, kUsualShare = 0.005;  ///< what is usual
-  static constexpr double kDeviationOfNarrow_m = 2.0;               ///< a sector that turns sees next to nothing again
-  static constexpr double kMostDeviations = 3.0;                    ///< more is never off
+  static constexpr double kDeviationOfNarrow_m = 2.0;  ///< a narrow view that turns sees mostly what is new
+  static constexpr double kMostDeviations = 3.0;       ///< more is never off
   static constexpr double kNever_log_odds = 20.0;
   static constexpr double kShareToLearn = 0.03;
   // Of the heading.
@@ -53,11 +53,11 @@ std::optional<Refusal> refuse_heading(const std::optional<TrajectoryPoint>& plac
 }
 
 double odometry_log_odds(const std::optional<TrajectoryPoint>& place, const std::optional<TrajectoryPoint>& query,
-                         const Pose& T_place_query, bool is_narrow, double unknown_log_odds) {
+                         const Pose& T_place_query, bool both_are_narrow, double unknown_log_odds) {
   if (!place || !query || place->origin != query->origin) return unknown_log_odds;
   const double off_m = (T_between(*place, *query).inverse() * T_place_query).translation().norm();
   const Apart apart(*place, *query);
-  const double always_m = is_narrow ? Drift::kDeviationOfNarrow_m : Drift::kDeviation_m;
+  const double always_m = both_are_narrow ? Drift::kDeviationOfNarrow_m : Drift::kDeviation_m;
   const double deviation_m = std::hypot(always_m + Drift::kUsualShare * apart.motion_m, apart.gaps_m);
   const double deviations = off_m / deviation_m;
   return deviations > Drift::kMostDeviations ? -Drift::kNever_log_odds : -0.5 * deviations * deviations;

@@ -26,7 +26,7 @@ std::optional<Refusal> refuse_heading(const std::optional<TrajectoryPoint>& plac
 /// that nothing makes up for them. Like houses in a row and the storeys of a building are told apart by nothing else.
 /// `unknown_log_odds` where odometry says nothing: it lost track in between, or one of the two has no point.
 double odometry_log_odds(const std::optional<TrajectoryPoint>& place, const std::optional<TrajectoryPoint>& query,
-                         const Pose& T_place_query, bool is_narrow, double unknown_log_odds = 0.0);
+                         const Pose& T_place_query, bool both_are_narrow, double unknown_log_odds = 0.0);
 
 /// Whether a query cannot stand at both poses at once, one found relative to place `a`, the other to `b`; false where
 /// odometry does not know how the places lie to each other.
