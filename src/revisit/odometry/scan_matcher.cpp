@@ -209,7 +209,7 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
       const double angle_rad = to_radians(angle_deg);
       const IcpResult other = align(radius_m, T_predicted * planar_pose(Matching::kStart_m * std::cos(angle_rad),
                                                                         Matching::kStart_m * std::sin(angle_rad), 0.0));
-      if (other.matched > icp.matched && is_possible(other)) icp = other;
+      if (other.matched_sideways > icp.matched_sideways && is_possible(other)) icp = other;
     }
   // A turn or a jolt that was not predicted, or the end of one. After a gap anything may fit somehow: nothing is tried.
   // With a few of the points; where these fit better, all are aligned.

@@ -26,6 +26,7 @@ struct Steps {
   static constexpr double kAcross = 1e-3;      ///< covariance across a plane, 1 along it (Segal et al., RSS 2009)
   static constexpr double kArm_m = 10.0;       ///< at which turns are weighed against translations
   static constexpr int kMostTilts = 10;        ///< steps of height and tilt alone
+  static constexpr double kAlongAxis = 0.99;   ///< cosine between a normal and the source's z axis: within 8 degrees
   // Points share the errors of the surfaces that they lie on, so that they count for fewer than they are.
   static constexpr double kPointsThatCountAsOne = 10.0, kLeastNoise_m = 0.02;
 };
@@ -100,6 +101,15 @@ double share_of(const Surface::Patch& patch, double noise_m) {
   return squared_m2 / (squared_m2 + static_cast<double>(patch.variance_m2));
 }
 
+// What a patch says about the pose. Rings of beams on level ground stand still in the sensor's frame, and the noise of
+// the patches that they make would hold it back: what faces along the rings' axis says nothing across it.
+Eigen::Vector3d said_by(const Eigen::Vector3d& normal, const Pose& T, bool has_rings) {
+  const Eigen::Vector3d z_axis = T.linear().col(2);
+  const double along = normal.dot(z_axis);
+  return has_rings && std::abs(along) > Steps::kAlongAxis ? Eigen::Vector3d(std::copysign(1.0, along) * z_axis)
+                                                          : normal;
+}
+
 // Points [begin, end) of the source in steps of `stride`, at kernel width `width_m`.
 Equations equations_of(const Surface& target, Points source, const IcpOptions& options, std::size_t begin,
                        std::size_t end, std::size_t stride, double width_m, double noise_m, const Pose& T, Met& met) {
@@ -115,8 +125,9 @@ Equations equations_of(const Surface& target, Points source, const IcpOptions& o
     const Eigen::Vector3d n = patch->normal.cast<double>(), d = p - patch->point.cast<double>();
     if (n.squaredNorm() < 0.5) continue;
     if (source_normals.empty()) {
+      const Eigen::Vector3d said = said_by(n, T, options.noise_m > 0.0);
       Vector6 J;
-      J << n, (p - T.translation()).cross(n);
+      J << said, (p - T.translation()).cross(said);
       const double residual = n.dot(d);
       const double weight = sum.weigh(residual * residual, shrink) * share_of(*patch, noise_m);
       sum.H.noalias() += (weight * J) * J.transpose();
@@ -192,6 +203,9 @@ bool step(const Surface& target, Points source, const IcpOptions& options, doubl
   if (!source.empty()) {
     const double share = static_cast<double>(stride) / static_cast<double>(source.size());
     result.matched = share * sum.weights;
+    const Eigen::Matrix3d faced = sum.H.topLeftCorner<3, 3>();
+    const Eigen::Vector3d z_axis = result.T_target_source.linear().col(2);
+    result.matched_sideways = share * (faced.trace() - z_axis.dot(faced * z_axis));
     result.met = share * static_cast<double>(sum.pairs);
   }
   if (sum.pairs < Steps::kFewestPairs) return false;

@@ -234,6 +234,37 @@ TEST(Icp, WhatIsUncertainCountsForLess) {
   EXPECT_LT(tilt_deg(0.03), 0.2);
 }
 
+// Level ground whose patches lean by six degrees to and fro, and a wall across at 20 m.
+class RippledGroundAndWall final : public Surface {
+ public:
+  bool nearest_patch(const Eigen::Vector3f& query, float, Patch& patch) const override {
+    if (query.x() > 10.f) {
+      patch = {.point = {20.f, query.y(), query.z()}, .normal = Eigen::Vector3f::UnitX()};
+      return true;
+    }
+    const float cell = std::round(query.x());
+    const float lean = static_cast<int>(cell) % 2 == 0 ? 0.1f : -0.1f;
+    patch = {.point = {cell, query.y(), 0.f}, .normal = Eigen::Vector3f(lean, 0.f, 1.f).normalized()};
+    return true;
+  }
+};
+
+TEST(Icp, RingsOnTheGroundDoNotHoldTheSensorBack) {
+  std::vector<Eigen::Vector3f> points;
+  for (int i = 0; i < 4000; ++i)
+    points.emplace_back(static_cast<float>(i % 20 - 10), 0.05f * static_cast<float>(i / 20) - 5.f, 0.f);
+  for (int i = 0; i < 40; ++i) points.emplace_back(19.7f, 0.5f * static_cast<float>(i) - 10.f, 1.f);  // 0.3 m before it
+  const auto align = [&](double noise_m) {
+    return align_icp(RippledGroundAndWall(), points, Pose::Identity(),
+                     {.coarse_m = 1.0, .least_seen = 1e-3, .noise_m = noise_m});
+  };
+  EXPECT_LT(align(0.0).T_target_source.translation().x(), 0.25) << "the ripples hold it back";
+  const IcpResult found = align(0.03);
+  EXPECT_NEAR(found.T_target_source.translation().x(), 0.3, 0.01);
+  EXPECT_GT(found.matched, 0.9);
+  EXPECT_NEAR(found.matched_sideways, 0.01, 0.005) << "the wall's share";
+}
+
 TEST(Agreement, WallsThatTheOtherScanSawThroughCount) {
   // The same room, once with a wall across it, which stands where the other scan saw the far side.
   const auto room = [](bool with_wall) {
