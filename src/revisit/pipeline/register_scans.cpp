@@ -2,12 +2,16 @@
 #include <revisit/pipeline/register_scans.hpp>
 
 #include <algorithm>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include <oneapi/tbb/parallel_for.h>
 
 #include <revisit/pipeline/prepare.hpp>
+#include <revisit/preprocess/undistort.hpp>
 #include <revisit/registration/overhead_search.hpp>
+#include <revisit/registration/sweep_motion.hpp>
 #include <revisit/verification/acceptance.hpp>
 #include <revisit/verification/geometric.hpp>
 
@@ -22,31 +26,43 @@ constexpr double kPrior_log_odds = 9.0, kPriorOfRooms_log_odds = 3.0;
 // Of two scans in a row, intensities correlate by .83 (HDL-64E) to .97 (OS0-128); which sensor this is, nobody knows.
 constexpr double kTypicalIntensities = 0.85;
 constexpr double kOther_m = 1.0, kOther_rad = 0.2;  // poses farther apart exclude each other
+constexpr double kHopeless_log_odds = -20.0;        // no motion makes another place the same
+// Among walls nothing moves faster; a motion that is found nevertheless makes a wrong heading fit.
+constexpr double kFastestInRooms_mps = 3.0;
+
+struct RegisteredPair {
+  ScanGeometry target, source;
+  GeometricEvidence found;
+};
 
 bool is_other(const Pose& a, const Pose& b) {
   const Pose apart = a.inverse() * b;
   return apart.translation().norm() > kOther_m || rotation_angle(apart) > kOther_rad;
 }
 
+CandidateView view_from(const Pose& T_guess_target_source, double overlap) {
+  CandidateView view;
+  view.T_guess_match_query = T_guess_target_source;
+  view.overlap = overlap;
+  view.typical.intensity_correlation = kTypicalIntensities;
+  return view;
+}
+
 // Every heading and position seen from overhead; the ones that share most are registered, the surest is the answer.
-GeometricEvidence register_without_guess(const ThinCloud& target_cloud, const ThinCloud& source_cloud,
-                                         const ScanGeometry& target, const ScanGeometry& source,
-                                         const GeometricOptions& options) {
+RegisteredPair register_without_guess(const ThinCloud& target_cloud, const ThinCloud& source_cloud,
+                                      const GeometricOptions& options) {
+  RegisteredPair pair{ScanGeometry(target_cloud), ScanGeometry(source_cloud), {}};
   OverheadSearch search(source_cloud);
   const auto starts = search.search(target_cloud, 0.0, kPi, kReach_m, kStarts);
   const double prior =
-      PairScale(target.surface(), source.surface()).in_the_open ? kPrior_log_odds : kPriorOfRooms_log_odds;
+      PairScale(pair.target.surface(), pair.source.surface()).in_the_open ? kPrior_log_odds : kPriorOfRooms_log_odds;
   std::vector<GeometricEvidence> found(starts.size());
   tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
-    CandidateView view;
-    view.T_guess_match_query = upright_pose(target_cloud.up).inverse() *
-                               planar_pose(starts[i].x_m, starts[i].y_m, starts[i].yaw_rad) *
-                               upright_pose(source_cloud.up);
-    view.overlap = starts[i].overlap;
-    view.typical.intensity_correlation = kTypicalIntensities;
-    found[i] = check_geometric(target, source, view, options);
+    const Pose T_guess = upright_pose(target_cloud.up).inverse() *
+                         planar_pose(starts[i].x_m, starts[i].y_m, starts[i].yaw_rad) * upright_pose(source_cloud.up);
+    found[i] = check_geometric(pair.target, pair.source, view_from(T_guess, starts[i].overlap), options);
   });
-  GeometricEvidence best = *std::max_element(
+  GeometricEvidence& best = pair.found = *std::max_element(
       found.begin(), found.end(), [](const auto& a, const auto& b) { return a.own_log_odds < b.own_log_odds; });
   // One pose is right at most: what another explains as well speaks against this one.
   double others = 0.0;
@@ -54,7 +70,36 @@ GeometricEvidence register_without_guess(const ThinCloud& target_cloud, const Th
     if (is_other(each.T_match_query, best.T_match_query))
       others = std::max(others, std::exp(each.own_log_odds + prior));
   decide(best, 0.0, prior - std::log1p(others), options);
-  return best;
+  return pair;
+}
+
+ScanGeometry geometry_without(const Twist& motion, const PreparedScan& scan) {
+  ThinCloud cloud = thin_for_registration(compensated(scan.scan, motion), scan.ground.is_ground);
+  cloud.up = scan.cloud.up;
+  return ScanGeometry(std::move(cloud));
+}
+
+// Nobody followed the sensors: at 10 m/s both sweeps are bent by up to a metre. The source's motion is found on the
+// target, then the target's on the source without its own; both are registered again without either. What speaks
+// against the pose besides the two scans stays as it is.
+std::optional<RegisteredPair> without_motion(const RegisteredPair& swept, const PreparedScan& target,
+                                             const PreparedScan& source, const GeometricOptions& options) {
+  const GeometricEvidence& found = swept.found;
+  if ((target.scan.times_s.empty() && source.scan.times_s.empty()) || found.own_log_odds < kHopeless_log_odds)
+    return std::nullopt;
+  const SweepMotion of_source = find_sweep_motion(swept.target.surface(), source.scan, found.T_match_query)
+                                    .value_or(SweepMotion{found.T_match_query, {}});
+  ScanGeometry straight_source = geometry_without(of_source.motion, source);
+  const Pose T_source_target = of_source.T_target_source.inverse();
+  const SweepMotion of_target = find_sweep_motion(straight_source.surface(), target.scan, T_source_target)
+                                    .value_or(SweepMotion{T_source_target, {}});
+  const double fastest_mps = std::max(of_source.motion.linear_mps.norm(), of_target.motion.linear_mps.norm());
+  if (!found.evidence.in_the_open && fastest_mps > kFastestInRooms_mps) return std::nullopt;
+  RegisteredPair straight{geometry_without(of_target.motion, target), std::move(straight_source), {}};
+  straight.found = check_geometric(straight.target, straight.source,
+                                   view_from(of_target.T_target_source.inverse(), found.evidence.overlap), options);
+  decide(straight.found, 0.0, found.log_odds - found.own_log_odds, options);
+  return straight;
 }
 
 }  // namespace
@@ -62,12 +107,15 @@ GeometricEvidence register_without_guess(const ThinCloud& target_cloud, const Th
 Result<Registration> register_scans(const Scan& source, const Scan& target, const Parameters& parameters) {
   if (const Status status = validate(parameters); !status) return status.error();
   ScanPreparation preparation(parameters, std::nullopt, {}, {});
-  const auto place = preparation.prepare(target), query = preparation.prepare(source);
-  for (const auto* each : {&place, &query})
+  const auto match = preparation.prepare(target), query = preparation.prepare(source);
+  for (const auto* each : {&match, &query})
     if (!*each) return each->error();
-  const ScanGeometry match(place->cloud), scan(query->cloud);
-  GeometricEvidence found = register_without_guess(place->cloud, query->cloud, match, scan, parameters.geometric);
-  if (found.is_consistent()) refine(found, match, scan);
+  RegisteredPair pair = register_without_guess(match->cloud, query->cloud, parameters.geometric);
+  if (auto straight = without_motion(pair, *match, *query, parameters.geometric);
+      straight && straight->found.own_log_odds > pair.found.own_log_odds)
+    pair = *std::move(straight);
+  GeometricEvidence& found = pair.found;
+  if (found.is_consistent()) refine(found, pair.target, pair.source);
   Registration result;
   result.refusal = found.refusal;
   result.T_target_source = found.T_match_query;

@@ -24,8 +24,9 @@ struct Registration {
 };
 
 /// Registers two scans of any sensor without a guess: up to some 10 m apart, with any heading. The scans come as a
-/// driver delivers them. An error where one of them describes no place. Deterministic; safe to call from several
-/// threads.
+/// driver delivers them; where their points carry times, the motion during each sweep is found and undone. Believes
+/// that both show one place: rooms and aisles that look alike cannot be told apart (docs/accuracy.md). An error where
+/// one of them describes no place. Deterministic; safe to call from several threads.
 Result<Registration> register_scans(const Scan& source, const Scan& target, const Parameters& parameters = {});
 
 }  // namespace revisit

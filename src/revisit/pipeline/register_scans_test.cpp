@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <revisit/core/twist.hpp>
+
 #include "synthetic_world.hpp"
 
 namespace revisit {
@@ -58,6 +60,40 @@ TEST(RegisterScans, TakesWhatADriverDelivers) {
   ASSERT_TRUE(found->is_accepted());
   const Pose error = (T_target.inverse() * T_source).inverse() * found->T_target_source;
   EXPECT_LT(error.translation().norm(), 0.1);
+}
+
+// As a sensor sees it that turns clockwise, once in 0.1 s, and moves meanwhile.
+Scan swept(Scan scan, const Twist& motion) {
+  for (Point& p : scan.points) {
+    const double time_s = -std::atan2(static_cast<double>(p.y), static_cast<double>(p.x)) / (2.0 * kPi) * 0.1;
+    const Eigen::Vector3d seen = motion_after(motion, time_s).inverse() * Eigen::Vector3f(p.x, p.y, p.z).cast<double>();
+    p = {static_cast<float>(seen.x()), static_cast<float>(seen.y()), static_cast<float>(seen.z()), p.intensity};
+    scan.times_s.push_back(static_cast<float>(time_s));
+  }
+  return scan;
+}
+
+// Two cars that pass each other: their sweeps are bent the opposite way.
+TEST(RegisterScans, UndoesTheMotionDuringBothSweeps) {
+  const SyntheticWorld world(51);
+  const Pose T_target = SyntheticWorld::at(4, 0, 0), T_source = SyntheticWorld::at(7, 2, to_radians(175.0));
+  const Scan target = swept(world.scan(T_target, kDenseSensor, 1), {{12.0, 0.0, 0.0}, {0.0, 0.0, 0.1}});
+  const Scan source = swept(world.scan(T_source, kDenseSensor, 2), {{11.0, 0.0, 0.0}, {0.0, 0.0, -0.2}});
+  const auto error_m = [&](const Registration& found) {
+    return ((T_target.inverse() * T_source).inverse() * found.T_target_source).translation().norm();
+  };
+  const auto without_times = [](Scan scan) {
+    scan.times_s.clear();
+    return scan;
+  };
+  const auto found = register_scans(source, target);
+  const auto half_known = register_scans(source, without_times(target));
+  const auto unknown = register_scans(without_times(source), without_times(target));
+  ASSERT_TRUE(found && half_known && unknown);
+  EXPECT_LT(error_m(*found), 0.05);
+  EXPECT_GT(found->inlier_ratio, unknown->inlier_ratio + 0.1);
+  EXPECT_GT(half_known->inlier_ratio, unknown->inlier_ratio + 0.1) << "one of two sweeps";
+  EXPECT_GT(found->probability, unknown->probability);
 }
 
 TEST(RegisterScans, AnEmptyScanIsAnErrorThatSaysWhy) {
