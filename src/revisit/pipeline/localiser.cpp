@@ -6,8 +6,6 @@
 #include <limits>
 #include <utility>
 
-#include <revisit/core/text.hpp>
-#include <revisit/preprocess/range_filter.hpp>
 #include <revisit/registration/sweep_motion.hpp>
 #include <revisit/store/sensor_facts.hpp>
 #include <revisit/store/stored_clouds.hpp>
@@ -16,30 +14,10 @@
 namespace revisit {
 namespace {
 
-struct Staying {
-  // Of a scan that was registered where it was predicted: it is there unless its own evidence speaks against it.
-  static constexpr double kLeast_log_odds = -3.0, kLeastOfNarrow_log_odds = -8.0;
-  static constexpr double kMost_m = 0.6, kMost_mAMetre = 0.03, kMost_deg = 4.0;  ///< from the prediction
-  static constexpr double kFar_m = 20.0;   ///< from the nearest place: it has left the map
-  static constexpr double kLost_m = 15.0;  ///< travelled without seeing the map
-  static constexpr double kLost_s = 6.0;
-  static constexpr double kDrift = 0.01;  ///< of odometry, a standard deviation for each metre
-};
-
-struct Waking {
-  static constexpr double kNarrowView_log_odds = 2.0;  ///< what a scan counts at most that does not decide alone
-};
-
 struct Nearby {
   static constexpr double kWorthwhile_log_odds = -4.0;
   static constexpr std::size_t kPlaces = 4;
   static constexpr double kSame_m = 1.0;  ///< the same pose
-};
-
-struct Expecting {
-  static constexpr double kNear_m = 4.0, kNear_deg = 40.0;  ///< by hand, on a picture of the map
-  static constexpr double kDrive_m = 20.0;                  ///< for which it is remembered
-  static constexpr std::size_t kPlaces = 4;
 };
 
 struct Moving {
@@ -52,28 +30,6 @@ double highest_log_odds(const Detection& detection) {
   for (const Detection::Registered& each : detection.registered)
     highest = std::max(highest, each.evidence.own_log_odds);
   return highest;
-}
-
-// A sector of a street fits elsewhere, too, where nothing can contradict it: one scan never decides.
-void ask_for_more_of_narrow_views(Detection& detection) {
-  if (!detection.loop) return;
-  const auto registered = std::find_if(detection.registered.begin(), detection.registered.end(),
-                                       [&](const auto& each) { return each.match == detection.loop->match; });
-  if (registered == detection.registered.end() || registered->evidence.evidence.decides_alone()) return;
-  detection.refusal = Refusal{Refusal::Reason::kOneNarrowView, detection.loop->probability, 0.0};
-  detection.loop.reset();
-}
-
-// What a pose is known to be after so much odometry.
-Matrix6 after_motion(const Matrix6& information, double metres) {
-  if (information.isZero() || metres <= 0.0) return information;
-  const double variance_m2 = std::pow(Staying::kDrift * metres, 2), variance_rad2 = 0.01 * variance_m2;
-  Vector6 diagonal;
-  diagonal << Eigen::Vector3d::Constant(variance_m2), Eigen::Vector3d::Constant(variance_rad2);
-  const Matrix6 prior = Vector6::Constant(1e-6).asDiagonal();
-  const Matrix6 covariance = Matrix6((information + prior).inverse()) + Matrix6(diagonal.asDiagonal());
-  const Matrix6 after = covariance.inverse();
-  return 0.5 * (after + after.transpose());
 }
 
 }  // namespace
@@ -130,6 +86,16 @@ Localisation Localiser::found(FrameId frame, const LoopConstraint& loop) const {
   return result;
 }
 
+// A sector of a street fits elsewhere, too, where nothing can contradict it: one scan never decides.
+void Localiser::ask_for_more_of_narrow_views(Detection& detection) {
+  if (!detection.loop) return;
+  const auto registered = std::find_if(detection.registered.begin(), detection.registered.end(),
+                                       [&](const auto& each) { return each.match == detection.loop->match; });
+  if (registered == detection.registered.end() || registered->evidence.evidence.decides_alone()) return;
+  detection.refusal = Refusal{Refusal::Reason::kOneNarrowView, detection.loop->probability, 0.0};
+  detection.loop.reset();
+}
+
 Result<Localisation> Localiser::locate(Scan scan) {
   auto prepared = preparation_.prepare(scan);
   if (!prepared) return prepared.error();
@@ -170,7 +136,8 @@ Result<std::optional<Twist>> Localiser::motion_of(const PreparedScan& scan, cons
                        [](const auto& a, const auto& b) { return a.evidence.own_log_odds < b.evidence.own_log_odds; });
   const auto place = recognition_.geometry(best->match);
   if (!place) return place.error();
-  const auto found = find_sweep_motion((*place)->surface(), scan.scan, best->evidence.T_match_query);
+  const auto found = find_sweep_motion((*place)->surface(), scan.scan, best->evidence.T_match_query,
+                                       best->evidence.evidence.in_the_open);
   if (!found) return std::optional<Twist>();
   const auto [first_s, last_s] = std::minmax_element(scan.scan.times_s.begin(), scan.scan.times_s.end());
   const double sweep_s = static_cast<double>(*last_s - *first_s);
@@ -180,85 +147,11 @@ Result<std::optional<Twist>> Localiser::motion_of(const PreparedScan& scan, cons
   return is_still ? std::optional<Twist>() : std::optional(found->motion);
 }
 
-Result<Localisation> Localiser::follow(Scan scan, const std::optional<Pose>& T_external_lidar) {
-  filter_range(scan, parameters_.preprocess);
-  const FrameId frame = scan.frame;
-  if (scan.points.empty()) return Error{to_text(frame) + ": no point within the range filter"};
-  const OdometryStep step = odometry_.follow(scan, T_external_lidar);
-  scan.stamp_s = step.stamp_s;
-  if (step.up) scan.up = step.up;
-  if (point_ && point_->segment == step.segment)
-    point_ = point_->to(step.T_odom_lidar);
-  else
-    point_ = TrajectoryPoint{.segment = step.segment, .T_segment_lidar = step.T_odom_lidar, .origin = step.segment};
-  if (following_ && following_->at.segment != point_->segment) following_.reset();  // odometry has lost itself
-  if (expected_ && !expected_->at) expected_->at = *point_;
-  if (expected_ && (expected_->at->segment != point_->segment ||
-                    point_->travelled_m - expected_->at->travelled_m > Expecting::kDrive_m))
-    expected_.reset();
-  auto prepared = preparation_.prepare(std::move(scan), step.motion);
-  if (!prepared) return prepared.error();
-  if (following_) {
-    auto stayed = stay(*prepared, *point_);
-    if (!stayed || stayed->status != Localisation::Status::kLost) return stayed;
-  }
-  auto result = wake_up(*prepared, *point_);
-  if (result) result->frame = frame;
-  return result;
-}
-
-Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const TrajectoryPoint& point) {
-  auto detection = recognition_.find(scan, places(), typical_);
-  if (!detection) return detection.error();
-  ask_for_more_of_narrow_views(*detection);
-  if (expected_)
-    if (const Status looked = look_where_expected(scan, point, *detection); !looked) return looked.error();
-  std::vector<PoseBelief::Sighting> sightings;
-  for (const Detection::Registered& each : detection->registered) {
-    const Pose T_map_lidar = map_.T_map_lidar(each.match) * each.evidence.T_match_query;
-    const int part = map_.part(each.match);
-    const double log_odds = each.evidence.evidence.decides_alone()
-                                ? each.evidence.own_log_odds
-                                : std::min(each.evidence.own_log_odds, Waking::kNarrowView_log_odds);
-    sightings.push_back({each.match, part, T_map_lidar, log_odds, expectation_log_odds(T_map_lidar, part, point)});
-  }
-  belief_.add(point, sightings);
-  Localisation result;
-  result.reason = detection->reason();
-  const auto best = belief_.best();
-  const double probability = best ? probability_of(best->log_odds) : 0.0;
-  if (detection->loop) {
-    result = found(scan.scan.frame, *detection->loop);
-  } else if (best && probability >= parameters_.geometric.min_probability) {
-    result.status = Localisation::Status::kFound;
-    result.T_map_lidar = best->T_map_segment * point.T_segment_lidar;
-    result.probability = probability;
-    result.match = best->match;
-    for (const Detection::Registered& each : detection->registered)
-      if (each.match == best->match) result.information = each.evidence.information;
-  }
-  if (result.T_map_lidar) {
-    following_ = Following{*result.T_map_lidar * point.T_segment_lidar.inverse(),
-                           point,
-                           scan.scan.stamp_s,
-                           map_.part(result.match),
-                           result.match,
-                           result.information,
-                           result.probability};
-    result.reason.clear();  // of one scan alone, which may not have been enough
-    belief_.clear();
-    expected_.reset();
-  }
-  result.frame = scan.scan.frame;
-  result.detection = *std::move(detection);
-  return result;
-}
-
 std::vector<PosePrediction> Localiser::nearest_places(const Pose& T_map_lidar, int part, std::size_t count) const {
   std::vector<std::pair<double, const StoredMapPose*>> nearest;
   for (const StoredMapPose& each : map_.poses()) {
     const double distance_m2 = (each.T_map_lidar.translation() - T_map_lidar.translation()).squaredNorm();
-    if (each.part != part || distance_m2 >= std::pow(Staying::kFar_m, 2)) continue;
+    if (each.part != part || distance_m2 >= std::pow(kFarFromPlaces_m, 2)) continue;
     if (nearest.size() == count && distance_m2 >= nearest.back().first) continue;
     if (nearest.size() == count) nearest.pop_back();
     nearest.insert(std::upper_bound(nearest.begin(), nearest.end(), std::pair(distance_m2, &each)),
@@ -303,97 +196,6 @@ void Localiser::set_verification(const Parameters& parameters) {
   recognition_.set_verification(require_valid(parameters));
   parameters_.temporal = parameters.temporal;
   parameters_.geometric = parameters.geometric;
-}
-
-void Localiser::expect(const Pose& T_map_lidar) {
-  const StoredMapPose* nearest = nullptr;
-  const auto distance_m = [&](const StoredMapPose& each) {
-    return (each.T_map_lidar.translation() - T_map_lidar.translation()).head<2>().norm();
-  };
-  for (const StoredMapPose& each : map_.poses())
-    if (each.part == 0 && (nearest == nullptr || distance_m(each) < distance_m(*nearest))) nearest = &each;
-  if (nearest == nullptr) return;
-  // As high as the place beside it, and tilted as it is.
-  const double turn_rad = yaw_of(T_map_lidar) - yaw_of(nearest->T_map_lidar);
-  Pose T = Pose::Identity();
-  T.translation() << T_map_lidar.translation().head<2>(), nearest->T_map_lidar.translation().z();
-  T.linear() = Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ()) * nearest->T_map_lidar.linear();
-  expected_ = Expected{T, std::nullopt};
-  following_.reset();
-  belief_.clear();
-}
-
-double Localiser::expectation_log_odds(const Pose& T_map_lidar, int part, const TrajectoryPoint& point) const {
-  if (!expected_ || part != 0) return 0.0;
-  const Pose T_expected = expected_->at_point(point);
-  const Pose off = T_expected.inverse() * T_map_lidar;
-  if (off.translation().norm() > Expecting::kNear_m || rotation_angle(off) > to_radians(Expecting::kNear_deg))
-    return 0.0;
-  std::size_t there = 1;
-  for (const StoredMapPose& each : map_.poses())
-    there += each.part == 0 && (each.T_map_lidar.translation() - T_expected.translation()).norm() <= Expecting::kNear_m;
-  return std::log(std::max(1.0, static_cast<double>(map_.poses().size()) / static_cast<double>(there)));
-}
-
-Status Localiser::look_where_expected(const PreparedScan& scan, const TrajectoryPoint& point, Detection& detection) {
-  for (const PosePrediction& each : nearest_places(expected_->at_point(point), 0, Expecting::kPlaces)) {
-    const auto tested = recognition_.test(scan, each, typical_);
-    if (!tested) return tested.error();
-    if (tested->geometric) detection.registered.push_back({each.match, *tested->geometric});
-  }
-  return ok();
-}
-
-Result<Localisation> Localiser::stay(const PreparedScan& scan, const TrajectoryPoint& point) {
-  Following& state = *following_;
-  const double travelled_m = point.travelled_m - state.at.travelled_m;
-  Localisation result;
-  result.frame = scan.scan.frame;
-  const Pose T_predicted = state.T_map_segment * point.T_segment_lidar;
-  const auto nearest = nearest_places(T_predicted, state.part, 1);
-  const PosePrediction* const prediction = nearest.empty() ? nullptr : &nearest.front();
-  if (prediction != nullptr) {
-    const auto tested = recognition_.test(scan, *prediction, typical_);
-    if (!tested) return tested.error();
-    if (tested->geometric) {
-      const GeometricEvidence& evidence = *tested->geometric;
-      const Pose off = prediction->T_match_query.inverse() * evidence.T_match_query;
-      const double least =
-          evidence.evidence.one_is_narrow ? Staying::kLeastOfNarrow_log_odds : Staying::kLeast_log_odds;
-      if (evidence.own_log_odds >= least &&
-          off.translation().norm() <= Staying::kMost_m + Staying::kMost_mAMetre * travelled_m &&
-          rotation_angle(off) <= to_radians(Staying::kMost_deg)) {
-        result.status = Localisation::Status::kFollowed;
-        result.T_map_lidar = map_.T_map_lidar(prediction->match) * evidence.T_match_query;
-        result.information = evidence.information;
-        result.probability = std::max(evidence.probability, state.probability);
-        result.match = prediction->match;
-        state = {*result.T_map_lidar * point.T_segment_lidar.inverse(),
-                 point,
-                 scan.scan.stamp_s,
-                 state.part,
-                 result.match,
-                 result.information,
-                 result.probability};
-        return result;
-      }
-      result.reason = format("does not fit the map where it is predicted: inliers %.2f, %.2f m off",
-                             evidence.evidence.inlier_ratio, off.translation().norm());
-    }
-  }
-  if (result.reason.empty())
-    result.reason = prediction != nullptr ? "does not fit the map where it is predicted"
-                                          : format("no place of the map is within %.0f m", Staying::kFar_m);
-  if (travelled_m > Staying::kLost_m || scan.scan.stamp_s - state.stamp_s > Staying::kLost_s) {
-    following_.reset();
-    return result;
-  }
-  result.status = Localisation::Status::kPredicted;
-  result.T_map_lidar = T_predicted;
-  result.information = after_motion(state.information, travelled_m);
-  result.probability = state.probability;
-  result.match = state.match;
-  return result;
 }
 
 }  // namespace revisit

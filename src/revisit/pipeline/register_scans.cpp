@@ -22,13 +22,11 @@ constexpr double kReach_m = 12.0;   // scans farther apart share too little
 constexpr std::size_t kStarts = 6;  // poses from overhead that are registered
 // Who asks how two scans lie to each other believes that they show one place; of candidates for a loop nearly all do
 // not. Rooms fit one another, and themselves turned by 90 degrees.
-constexpr double kPrior_log_odds = 9.0, kPriorOfRooms_log_odds = 3.0;
+constexpr double kPrior_log_odds = 6.0, kPriorOfRooms_log_odds = 3.0;
 // Of two scans in a row, intensities correlate by .83 (HDL-64E) to .97 (OS0-128); which sensor this is, nobody knows.
 constexpr double kTypicalIntensities = 0.85;
 constexpr double kOther_m = 1.0, kOther_rad = 0.2;  // poses farther apart exclude each other
 constexpr double kHopeless_log_odds = -20.0;        // no motion makes another place the same
-// Among walls nothing moves faster; a motion that is found nevertheless makes a wrong heading fit.
-constexpr double kFastestInRooms_mps = 3.0;
 
 struct RegisteredPair {
   ScanGeometry target, source;
@@ -87,14 +85,13 @@ std::optional<RegisteredPair> without_motion(const RegisteredPair& swept, const 
   const GeometricEvidence& found = swept.found;
   if ((target.scan.times_s.empty() && source.scan.times_s.empty()) || found.own_log_odds < kHopeless_log_odds)
     return std::nullopt;
-  const SweepMotion of_source = find_sweep_motion(swept.target.surface(), source.scan, found.T_match_query)
+  const bool in_the_open = found.evidence.in_the_open;
+  const SweepMotion of_source = find_sweep_motion(swept.target.surface(), source.scan, found.T_match_query, in_the_open)
                                     .value_or(SweepMotion{found.T_match_query, {}});
   ScanGeometry straight_source = geometry_without(of_source.motion, source);
   const Pose T_source_target = of_source.T_target_source.inverse();
-  const SweepMotion of_target = find_sweep_motion(straight_source.surface(), target.scan, T_source_target)
+  const SweepMotion of_target = find_sweep_motion(straight_source.surface(), target.scan, T_source_target, in_the_open)
                                     .value_or(SweepMotion{T_source_target, {}});
-  const double fastest_mps = std::max(of_source.motion.linear_mps.norm(), of_target.motion.linear_mps.norm());
-  if (!found.evidence.in_the_open && fastest_mps > kFastestInRooms_mps) return std::nullopt;
   RegisteredPair straight{geometry_without(of_target.motion, target), std::move(straight_source), {}};
   straight.found = check_geometric(straight.target, straight.source,
                                    view_from(of_target.T_target_source.inverse(), found.evidence.overlap), options);

@@ -19,6 +19,7 @@ struct Sweep {
   static constexpr double kLinear_mps = 10.0, kVertical_mps = 0.5, kTurn_radps = 1.0, kTilt_radps = 0.3;
   static constexpr double kNoise_m = 0.3;  ///< of a point on the surface, with all that is not modelled
   static constexpr double kMost_m = 2.0;   ///< that the pose may move from the guess
+  static constexpr double kFastestInRooms_mps = 3.0;
 };
 
 struct SweptPoint {
@@ -47,8 +48,8 @@ using Vector12 = Eigen::Matrix<double, 12, 1>;
 
 }  // namespace
 
-std::optional<SweepMotion> find_sweep_motion(const Surface& target, const Scan& scan,
-                                             const Pose& T_guess_target_source) {
+std::optional<SweepMotion> find_sweep_motion(const Surface& target, const Scan& scan, const Pose& T_guess_target_source,
+                                             bool in_the_open) {
   if (scan.times_s.empty()) return std::nullopt;
   const std::vector<SweptPoint> points = thinned(scan);
   SweepMotion found{T_guess_target_source, {}};
@@ -91,6 +92,7 @@ std::optional<SweepMotion> find_sweep_motion(const Surface& target, const Scan& 
   }
   const Pose moved = T_guess_target_source.inverse() * found.T_target_source;
   if (moved.translation().norm() > Sweep::kMost_m) return std::nullopt;
+  if (!in_the_open && found.motion.linear_mps.norm() > Sweep::kFastestInRooms_mps) return std::nullopt;
   return found;
 }
 

@@ -38,27 +38,28 @@ TEST(SweepMotion, IsFoundWithThePoseFromASurface) {
   const Scan query = swept(world.scan(T_place_query, kSensor, 2));
   const SurfaceCloud surface(thin(place.points, {}, 1.0));
   const Pose T_guess = planar_pose(0.5, 0.5, 0.12);
-  const auto found = find_sweep_motion(surface, query, T_guess);
+  const auto found = find_sweep_motion(surface, query, T_guess, true);
   ASSERT_TRUE(found);
   const Pose T_true = SyntheticWorld::at(0, 0, 0).inverse() * T_place_query;
   EXPECT_LT((found->motion.linear_mps - kMotion.linear_mps).norm(), 1.5);
   EXPECT_LT((found->motion.angular_radps - kMotion.angular_radps).norm(), 0.15);
   EXPECT_LT((T_true.inverse() * found->T_target_source).translation().norm(), 0.1);
+  EXPECT_FALSE(find_sweep_motion(surface, query, T_guess, false)) << "nothing moves so fast among walls";
 }
 
 TEST(SweepMotion, ASensorThatStandsDoesNotMove) {
   const SyntheticWorld world(61);
   Scan scan = world.scan(SyntheticWorld::at(0, 0, 0), kSensor, 1);
   const SurfaceCloud surface(thin(scan.points, {}, 1.0));
-  EXPECT_FALSE(find_sweep_motion(surface, scan, Pose::Identity())) << "without times";
+  EXPECT_FALSE(find_sweep_motion(surface, scan, Pose::Identity(), true)) << "without times";
   for (std::size_t i = 0; i < scan.points.size(); ++i)
     scan.times_s.push_back(static_cast<float>(i % 100) * 1e-3f - 0.05f);
-  const auto found = find_sweep_motion(surface, scan, Pose::Identity());
+  const auto found = find_sweep_motion(surface, scan, Pose::Identity(), false);
   ASSERT_TRUE(found);
   EXPECT_LT(found->motion.linear_mps.norm(), 0.3);
   Pose far = Pose::Identity();
   far.translation().z() = 500.0;
-  EXPECT_FALSE(find_sweep_motion(surface, scan, far)) << "nothing meets it there";
+  EXPECT_FALSE(find_sweep_motion(surface, scan, far, true)) << "nothing meets it there";
 }
 
 }  // namespace
