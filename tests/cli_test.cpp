@@ -49,12 +49,12 @@ std::vector<Point> scan_at(double x, double yaw_deg = 0.0) {
   return world.scan(SyntheticWorld::at(x, 0, to_radians(yaw_deg)), {32, 450, -24.8, 5.0}).points;
 }
 
-// A KITTI-like folder: out along x and back again, with poses in the LiDAR's own frame. 4 m a frame, 12 frames.
-fs::path there_and_back(const fs::path& folder) {
+// A KITTI-like folder: out along x and back again, with poses in the LiDAR's own frame. 12 frames, one a second.
+fs::path there_and_back(const fs::path& folder, double step_m = 4.0, double back_yaw_deg = 180.0) {
   fs::create_directories(folder / "velodyne");
   Trajectory trajectory;
   for (int i = 0; i < 12; ++i) {
-    const double x = i < 6 ? 4.0 * i : 4.0 * (11 - i) + 0.5, yaw_deg = i < 6 ? 0.0 : 180.0;
+    const double x = i < 6 ? step_m * i : step_m * (11 - i) + 0.5, yaw_deg = i < 6 ? 0.0 : back_yaw_deg;
     write_scan(folder / "velodyne", i, scan_at(x, yaw_deg));
     trajectory.entries[FrameId{i}] = {i * 1.0, SyntheticWorld::at(x, 0, to_radians(yaw_deg))};
   }
@@ -63,6 +63,9 @@ fs::path there_and_back(const fs::path& folder) {
   for (int i = 0; i < 12; ++i) times << i << "\n";
   return folder;
 }
+
+// As a vehicle moves: slowly, and back in reverse gear. What turns within a second, odometry does not follow.
+fs::path there_and_back_slowly(const fs::path& folder) { return there_and_back(folder, 2.0, 0.0); }
 
 const std::string kShortExclusion = " --retrieval.exclude_frames 4 --retrieval.exclude_s 4";
 
@@ -93,7 +96,8 @@ TEST(Cli, AWrongParameterIsNamedWithItsAllowedRange) {
 }
 
 TEST(Cli, DetectAndEvaluateARecordingWithLoops) {
-  const fs::path folder = fresh_folder(), recording = there_and_back(folder / "recording"), out = folder / "out";
+  const fs::path folder = fresh_folder(), out = folder / "out";
+  const fs::path recording = there_and_back_slowly(folder / "recording");
   const Outcome detect = run("detect " + recording.string() + " --out " + out.string() + kShortExclusion);
   ASSERT_EQ(detect.code, 0) << detect.output;
   const auto loops = read_loops(out / "loops.csv");
@@ -299,7 +303,7 @@ TEST(Cli, RecordingsOfNoUseFailWithAMessage) {
 }
 
 TEST(Cli, EqualIntensitiesAreToldAndGeometryServes) {
-  const fs::path folder = fresh_folder(), recording = there_and_back(folder / "recording");
+  const fs::path folder = fresh_folder(), recording = there_and_back_slowly(folder / "recording");
   for (const auto& entry : fs::directory_iterator(recording / "velodyne")) {
     std::vector<Point> points(fs::file_size(entry) / sizeof(Point));
     std::ifstream(entry.path(), std::ios::binary)

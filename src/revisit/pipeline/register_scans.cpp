@@ -22,10 +22,11 @@ constexpr double kReach_m = 12.0;   // scans farther apart share too little
 constexpr std::size_t kStarts = 6;  // poses from overhead that are registered
 // Who asks how two scans lie to each other believes that they show one place; of candidates for a loop nearly all do
 // not. Rooms fit one another, and themselves turned by 90 degrees.
-constexpr double kPrior_log_odds = 6.0, kPriorOfRooms_log_odds = 3.0;
+constexpr double kPrior_log_odds = 5.0, kPriorOfRooms_log_odds = 3.0;
 // Of two scans in a row, intensities correlate by .83 (HDL-64E) to .97 (OS0-128); which sensor this is, nobody knows.
 constexpr double kTypicalIntensities = 0.85;
 constexpr double kOther_m = 1.0, kOther_rad = 0.2;  // poses farther apart exclude each other
+constexpr int kRounds = 2;                          // in which the motion of one sweep tells that of the other
 constexpr double kHopeless_log_odds = -20.0;        // no motion makes another place the same
 
 struct RegisteredPair {
@@ -78,23 +79,31 @@ ScanGeometry geometry_without(const Twist& motion, const PreparedScan& scan) {
 }
 
 // Nobody followed the sensors: at 10 m/s both sweeps are bent by up to a metre. The source's motion is found on the
-// target, then the target's on the source without its own; both are registered again without either. What speaks
-// against the pose besides the two scans stays as it is.
+// target, then the target's on the source without its own, and so once more; both are registered again without either.
+// What speaks against the pose besides the two scans stays as it is.
 std::optional<RegisteredPair> without_motion(const RegisteredPair& swept, const PreparedScan& target,
                                              const PreparedScan& source, const GeometricOptions& options) {
   const GeometricEvidence& found = swept.found;
   if ((target.scan.times_s.empty() && source.scan.times_s.empty()) || found.own_log_odds < kHopeless_log_odds)
     return std::nullopt;
   const bool in_the_open = found.evidence.in_the_open;
-  const SweepMotion of_source = find_sweep_motion(swept.target.surface(), source.scan, found.T_match_query, in_the_open)
-                                    .value_or(SweepMotion{found.T_match_query, {}});
-  ScanGeometry straight_source = geometry_without(of_source.motion, source);
-  const Pose T_source_target = of_source.T_target_source.inverse();
-  const SweepMotion of_target = find_sweep_motion(straight_source.surface(), target.scan, T_source_target, in_the_open)
-                                    .value_or(SweepMotion{T_source_target, {}});
-  RegisteredPair straight{geometry_without(of_target.motion, target), std::move(straight_source), {}};
-  straight.found = check_geometric(straight.target, straight.source,
-                                   view_from(of_target.T_target_source.inverse(), found.evidence.overlap), options);
+  Pose T_target_source = found.T_match_query;
+  std::optional<ScanGeometry> straight_target, straight_source;
+  for (int round = 0; round < kRounds; ++round) {
+    const SurfaceCloud& on = straight_target ? straight_target->surface() : swept.target.surface();
+    const SweepMotion of_source =
+        find_sweep_motion(on, source.scan, T_target_source, in_the_open).value_or(SweepMotion{T_target_source, {}});
+    straight_source.emplace(geometry_without(of_source.motion, source));
+    const Pose T_source_target = of_source.T_target_source.inverse();
+    const SweepMotion of_target =
+        find_sweep_motion(straight_source->surface(), target.scan, T_source_target, in_the_open)
+            .value_or(SweepMotion{T_source_target, {}});
+    straight_target.emplace(geometry_without(of_target.motion, target));
+    T_target_source = of_target.T_target_source.inverse();
+  }
+  RegisteredPair straight{*std::move(straight_target), *std::move(straight_source), {}};
+  straight.found =
+      check_geometric(straight.target, straight.source, view_from(T_target_source, found.evidence.overlap), options);
   decide(straight.found, 0.0, found.log_odds - found.own_log_odds, options);
   return straight;
 }
