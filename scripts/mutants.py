@@ -43,7 +43,7 @@ def mutants_of(file):
             continue
         for pattern, instead in MISTAKES:
             for found in re.finditer(pattern, code):
-                yield number, code[:found.start()] + re.sub(pattern, instead, found.group()) + line[found.end():]
+                yield number, code[:found.start()] + instead + line[found.end():]
 
 
 def main():
