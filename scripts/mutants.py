@@ -57,7 +57,7 @@ def main():
     for name in subprocess.run(["git", "ls-files", "src", "tests", "cmake", "CMakeLists.txt"], cwd=ROOT, capture_output=True, text=True).stdout.split():
         if (ROOT / name).exists():
             (tree / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(ROOT / name, tree / name)
+            shutil.copy(ROOT / name, tree / name)  # as new, so that no mistake of the last run stays built
     tests = [f"{module}_test" for module in given.modules]
     if run("cmake", "-S", tree, "-B", build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_CXX_FLAGS_DEBUG=-O1",
            "-DREVISIT_BUILD_APPS=OFF", "-DREVISIT_BUILD_BINDINGS=OFF", "-DREVISIT_BUILD_BENCHMARKS=OFF",

@@ -116,6 +116,19 @@ TEST(PlaceIndex, MisuseThrows) {
   EXPECT_FALSE(index.find(FrameId{9}));
   ASSERT_TRUE(index.find(FrameId{2}));
   EXPECT_EQ(index.find(FrameId{2})->occupancy[0], random_context(2).occupancy[0]);
+
+  PlaceIndex second = filled({}, 1);
+  EXPECT_THROW(second.add(FrameId{0}, 1.0, random_context(1)), std::invalid_argument) << "the second place, too";
+}
+
+TEST(PlaceIndex, AnotherGridIsNotCompared) {
+  const PlaceIndex index = filled({}, 3);
+  DescriptorOptions fewer_rings, fewer_sectors, fewer_levels;
+  fewer_rings.rings -= 1;
+  fewer_sectors.sectors /= 2;
+  fewer_levels.levels -= 1;
+  for (const DescriptorOptions& each : {fewer_rings, fewer_sectors, fewer_levels})
+    EXPECT_THROW((void)index.search(describe(testing_support::random_points(600, 1), each), 3), std::invalid_argument);
 }
 
 }  // namespace
