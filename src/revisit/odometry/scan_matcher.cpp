@@ -171,6 +171,7 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
                                .least_reach_m = map_->voxel_m(),
                                .settled_m = Matching::kSettled_m,
                                .least_seen = Matching::kLeastSeen,
+                               .has_rings = has_rings_,
                                .noise_m = has_rings_ ? Matching::kNoise_m : 0.0});
     icp.converged = icp.converged || (icp.information(0, 0) > 0.0 && icp.last_step_m < Matching::kSteady_m);
     return icp;

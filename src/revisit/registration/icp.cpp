@@ -101,13 +101,14 @@ double share_of(const Surface::Patch& patch, double noise_m) {
   return squared_m2 / (squared_m2 + static_cast<double>(patch.variance_m2));
 }
 
-// What a patch says about the pose. Rings of beams on level ground stand still in the sensor's frame, and the noise of
-// the patches that they make would hold it back: what faces along the rings' axis says nothing across it.
-Eigen::Vector3d said_by(const Eigen::Vector3d& normal, const Pose& T, bool has_rings) {
+// The direction along which a patch fixes the pose. Rings of beams on level ground stand still in the sensor's frame,
+// and the noise in the normals of their patches would hold the sensor back: what faces along the rings' axis fixes
+// nothing across it.
+Eigen::Vector3d fixed_by(const Eigen::Vector3d& normal, const Pose& T, bool has_rings) {
   const Eigen::Vector3d z_axis = T.linear().col(2);
-  const double along = normal.dot(z_axis);
-  return has_rings && std::abs(along) > Steps::kAlongAxis ? Eigen::Vector3d(std::copysign(1.0, along) * z_axis)
-                                                          : normal;
+  const double cosine = normal.dot(z_axis);
+  return has_rings && std::abs(cosine) > Steps::kAlongAxis ? Eigen::Vector3d(std::copysign(1.0, cosine) * z_axis)
+                                                           : normal;
 }
 
 // Points [begin, end) of the source in steps of `stride`, at kernel width `width_m`.
@@ -125,9 +126,9 @@ Equations equations_of(const Surface& target, Points source, const IcpOptions& o
     const Eigen::Vector3d n = patch->normal.cast<double>(), d = p - patch->point.cast<double>();
     if (n.squaredNorm() < 0.5) continue;
     if (source_normals.empty()) {
-      const Eigen::Vector3d said = said_by(n, T, options.noise_m > 0.0);
+      const Eigen::Vector3d along = fixed_by(n, T, options.has_rings);
       Vector6 J;
-      J << said, (p - T.translation()).cross(said);
+      J << along, (p - T.translation()).cross(along);
       const double residual = n.dot(d);
       const double weight = sum.weigh(residual * residual, shrink) * share_of(*patch, noise_m);
       sum.H.noalias() += (weight * J) * J.transpose();

@@ -16,8 +16,8 @@ struct IcpResult {
   double last_step_m = 0.0;  ///< how far the last step moved points 20 m away
   /// Share of the source's points that lie on a patch, each counted by its weight in the last step.
   double matched = 0.0;
-  /// The same, each counted by how far its patch faces sideways, across the source's z axis: rings of beams on the
-  /// ground match wherever the sensor went.
+  /// The same, each point weighed by the squared part of its patch's normal across the source's z axis, [0, 1]: rings
+  /// of beams on the ground match wherever the sensor went, and count for nothing here.
   double matched_sideways = 0.0;
   double met = 0.0;  ///< share of them with any patch within reach, however far from its plane
   /// Inverse covariance of xi where the true pose is T_target_source * small_motion(xi): metres, then radians, in the
@@ -34,8 +34,10 @@ struct IcpOptions {
   /// Directions in which the surfaces' normals have on average a smaller square share than this stay as guessed: along
   /// a bare corridor normals are noise. Turns count as the motion of a point 10 m away.
   double least_seen = 0.0;
-  /// Point-to-plane, where above 0: the source was seen by rings of beams about its z axis. Patches that face along it
-  /// say nothing across it; and once settled, height, roll and pitch along the source's axes settle again with each
+  /// Point-to-plane: the source was seen by rings of beams about its z axis. Patches that face along that axis, to
+  /// within 8 degrees, then fix nothing across it.
+  bool has_rings = false;
+  /// Point-to-plane, where above 0: once settled, height, roll and pitch along the source's axes settle again with each
   /// pair weighed by the noise of points (this, a standard deviation) and the variance of its patch. Only they: along
   /// the ground a lorry beside is as certain as any wall.
   double noise_m = 0.0;

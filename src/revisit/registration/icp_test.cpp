@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/registration/icp.hpp>
+
+#include <gtest/gtest.h>
+
+#include <pcl/point_types.h>
+#include <pcl/registration/gicp.h>
+#include <pcl/registration/icp.h>
+
+#include <revisit/registration/agreement.hpp>
+#include <revisit/registration/surface_cloud.hpp>
+
+#include "thin_scan.hpp"
+
+namespace revisit {
+namespace {
+
+using testing_support::error_deg;
+using testing_support::error_m;
+using testing_support::SyntheticWorld;
+using testing_support::thin_scan;
+
+TEST(Icp, FindsAKnownMotionFromMetresAway) {
+  const Pose T_a = SyntheticWorld::at(0, 0, 0), T_b = SyntheticWorld::at(2.5, 0.8, to_radians(8.0));
+  const SurfaceCloud a(thin_scan(T_a)), b(thin_scan(T_b, 2));
+  const Pose T_truth = T_a.inverse() * T_b;
+  const IcpResult result = align_icp(a, b.points(), Pose::Identity());
+  EXPECT_TRUE(result.converged);
+  EXPECT_LT(error_m(result.T_target_source, T_truth), 0.05);
+  EXPECT_LT(error_deg(result.T_target_source, T_truth), 0.2);
+  EXPECT_GT(measure_agreement(a, b, result.T_target_source, 0.4).inlier_ratio, 0.7);
+}
+
+TEST(Icp, AgreesWithPclFromNearby) {
+  const Pose T_a = SyntheticWorld::at(0, 0, 0), T_b = SyntheticWorld::at(0.3, 0.1, to_radians(1.0));
+  const SurfaceCloud a(thin_scan(T_a)), b(thin_scan(T_b, 2));
+  pcl::PointCloud<pcl::PointNormal>::Ptr pa(new pcl::PointCloud<pcl::PointNormal>),
+      pb(new pcl::PointCloud<pcl::PointNormal>);
+  for (const auto& [cloud, target] : {std::pair{&a, pa}, {&b, pb}})
+    for (std::size_t i = 0; i < cloud->size(); ++i) {
+      if (cloud->normal(i).squaredNorm() < 0.5f) continue;
+      pcl::PointNormal p;
+      p.getVector3fMap() = cloud->point(i);
+      p.getNormalVector3fMap() = cloud->normal(i);
+      target->push_back(p);
+    }
+  pcl::IterativeClosestPointWithNormals<pcl::PointNormal, pcl::PointNormal> oracle;
+  oracle.setInputTarget(pa);
+  oracle.setInputSource(pb);
+  oracle.setMaxCorrespondenceDistance(0.5);
+  oracle.setMaximumIterations(50);
+  pcl::PointCloud<pcl::PointNormal> unused;
+  oracle.align(unused);
+  const Pose T_oracle(oracle.getFinalTransformation().cast<double>());
+  const Pose T = align_icp(a, b.points(), Pose::Identity(), {.coarse_m = 1.0}).T_target_source;
+  EXPECT_LT(error_m(T, T_oracle), 0.05);
+  EXPECT_LT(error_deg(T, T_oracle), 0.2);
+}
+
+TEST(Icp, PlaneToPlaneAgreesWithPclsGeneralisedIcp) {
+  const Pose T_a = SyntheticWorld::at(0, 0, 0), T_b = SyntheticWorld::at(0.3, 0.1, to_radians(1.0));
+  const SurfaceCloud a(thin_scan(T_a)), b(thin_scan(T_b, 2));
+  pcl::PointCloud<pcl::PointXYZ>::Ptr pa(new pcl::PointCloud<pcl::PointXYZ>), pb(new pcl::PointCloud<pcl::PointXYZ>);
+  for (const auto& [cloud, target] : {std::pair{&a, pa}, {&b, pb}})
+    for (const auto& p : cloud->points()) target->push_back({p.x(), p.y(), p.z()});
+  pcl::GeneralizedIterativeClosestPoint<pcl::PointXYZ, pcl::PointXYZ> oracle;
+  oracle.setInputTarget(pa);
+  oracle.setInputSource(pb);
+  oracle.setMaxCorrespondenceDistance(1.0);
+  pcl::PointCloud<pcl::PointXYZ> unused;
+  oracle.align(unused);
+  const Pose T_oracle(oracle.getFinalTransformation().cast<double>()), T_truth = T_a.inverse() * T_b;
+  const Pose T =
+      align_icp(a, b.points(), Pose::Identity(), {.coarse_m = 1.0, .source_normals = b.normals()}).T_target_source;
+  EXPECT_LT(error_m(T, T_oracle), 0.05);
+  EXPECT_LT(error_deg(T, T_oracle), 0.2);
+  EXPECT_LT(error_m(T, T_truth), 0.05);
+}
+
+TEST(Icp, InformationIsSmallAlongACorridor) {
+  std::vector<Point> corridor, room;
+  for (float x = -20.f; x <= 20.f; x += 0.25f)
+    for (float z = 0.f; z <= 3.f; z += 0.25f)
+      for (const float y : {-2.f, 2.f}) corridor.push_back({x, y, z, 0.f});
+  for (float x = -20.f; x <= 20.f; x += 0.25f)
+    for (float y = -2.f; y <= 2.f; y += 0.25f) corridor.push_back({x, y, 0.f, 0.f});
+  room = corridor;
+  for (float y = -2.f; y <= 2.f; y += 0.25f)
+    for (float z = 0.f; z <= 3.f; z += 0.25f) room.push_back({15.f, y, z, 0.f});
+  const auto information = [](const std::vector<Point>& points, const Pose& T) {
+    const SurfaceCloud cloud(thin(points, {}, 0.5));
+    std::vector<Eigen::Vector3f> seen;  // by a sensor that stands elsewhere and looks another way
+    for (const auto& p : cloud.points()) seen.push_back((T.inverse() * p.cast<double>()).cast<float>());
+    return align_icp(cloud, seen, T).information;
+  };
+  const Matrix6 open = information(corridor, Pose::Identity()), closed = information(room, Pose::Identity());
+  EXPECT_LT(open(0, 0), 0.05 * open(1, 1)) << "nothing fixes the way along x";
+  EXPECT_GT(closed(0, 0), 5.0 * open(0, 0)) << "the wall ahead does";
+  // Seen by a sensor turned to the left, the corridor runs along its y.
+  const Matrix6 turned = information(corridor, planar_pose(3, 0, kPi / 2));
+  EXPECT_LT(turned(1, 1), 0.05 * turned(0, 0));
+}
+
+TEST(Icp, GivesUpEarlyWhereTooLittleMatches) {
+  const SurfaceCloud a(thin_scan(SyntheticWorld::at(0, 0, 0)));
+  const Scan scan = SyntheticWorld(32).scan(SyntheticWorld::at(0, 0, 0), {32, 900, -24.8, 5.0});
+  const SurfaceCloud elsewhere(thin(scan.points, {}, 1.0));
+  const IcpResult patient = align_icp(a, elsewhere.points(), Pose::Identity());
+  ASSERT_LT(patient.matched, 0.6);
+  const IcpResult result = align_icp(a, elsewhere.points(), Pose::Identity(), {.least_matched = 0.8});
+  EXPECT_FALSE(result.converged);
+  EXPECT_LT(result.iterations, patient.iterations);
+  const SurfaceCloud here(thin_scan(SyntheticWorld::at(0.5, 0, 0), 2));
+  EXPECT_TRUE(align_icp(a, here.points(), Pose::Identity(), {.least_matched = 0.3}).converged);
+}
+
+TEST(Icp, OfAScanWithItselfIsTheIdentity) {
+  const SurfaceCloud a(thin_scan(SyntheticWorld::at(0, 0, 0)));
+  const IcpResult result = align_icp(a, a.points(), Pose::Identity());
+  EXPECT_TRUE(result.converged);
+  EXPECT_LT(error_m(result.T_target_source, Pose::Identity()), 1e-6);
+  const Agreement agreement = measure_agreement(a, a, Pose::Identity(), 0.4);
+  EXPECT_DOUBLE_EQ(agreement.inlier_ratio, 1.0);
+  EXPECT_NEAR(agreement.rmse_m, 0.0, 1e-9);
+}
+
+// A level floor on one side, on the other something vague that leans by two degrees.
+class FloorAndHedge final : public Surface {
+ public:
+  bool nearest_patch(const Eigen::Vector3f& query, float, Patch& patch) const override {
+    patch = {.point = {query.x(), query.y(), 0.f}, .normal = Eigen::Vector3f::UnitZ()};
+    if (query.y() < 0.f) return true;
+    constexpr float kSlope = 0.035f;
+    patch.point.z() = kSlope * query.x();
+    patch.normal = Eigen::Vector3f(-kSlope, 0.f, 1.f).normalized();
+    patch.variance_m2 = 0.04f;
+    return true;
+  }
+};
+
+TEST(Icp, WhatIsUncertainCountsForLess) {
+  std::vector<Eigen::Vector3f> level;
+  for (int i = 0; i < 400; ++i)
+    level.emplace_back(static_cast<float>(i % 20 - 10), static_cast<float>(i / 20) - 9.5f, 0.f);
+  const auto tilt_deg = [&](double noise_m) {
+    const IcpResult result =
+        align_icp(FloorAndHedge(), level, Pose::Identity(), {.coarse_m = 1.0, .least_seen = 0.01, .noise_m = noise_m});
+    EXPECT_TRUE(result.converged);
+    return to_degrees(rotation_angle(result.T_target_source));
+  };
+  EXPECT_GT(tilt_deg(0.0), 0.7);
+  EXPECT_LT(tilt_deg(0.03), 0.2);
+}
+
+// Level ground whose patches lean by six degrees to and fro, and a wall across at 20 m.
+class RippledGroundAndWall final : public Surface {
+ public:
+  bool nearest_patch(const Eigen::Vector3f& query, float, Patch& patch) const override {
+    if (query.x() > 10.f) {
+      patch = {.point = {20.f, query.y(), query.z()}, .normal = Eigen::Vector3f::UnitX()};
+      return true;
+    }
+    const float cell = std::round(query.x());
+    const float lean = static_cast<int>(cell) % 2 == 0 ? 0.1f : -0.1f;
+    patch = {.point = {cell, query.y(), 0.f}, .normal = Eigen::Vector3f(lean, 0.f, 1.f).normalized()};
+    return true;
+  }
+};
+
+TEST(Icp, RingsOnTheGroundDoNotHoldTheSensorBack) {
+  std::vector<Eigen::Vector3f> points;
+  for (int i = 0; i < 4000; ++i)
+    points.emplace_back(static_cast<float>(i % 20 - 10), 0.05f * static_cast<float>(i / 20) - 5.f, 0.f);
+  for (int i = 0; i < 40; ++i) points.emplace_back(19.7f, 0.5f * static_cast<float>(i) - 10.f, 1.f);  // 0.3 m before it
+  const auto align = [&](bool has_rings) {
+    return align_icp(RippledGroundAndWall(), points, Pose::Identity(),
+                     {.coarse_m = 1.0, .least_seen = 1e-3, .has_rings = has_rings});
+  };
+  EXPECT_LT(align(false).T_target_source.translation().x(), 0.25) << "the ripples hold it back";
+  const IcpResult found = align(true);
+  EXPECT_NEAR(found.T_target_source.translation().x(), 0.3, 0.01);
+  EXPECT_GT(found.matched, 0.9);
+  EXPECT_NEAR(found.matched_sideways, 0.01, 0.005) << "the wall's share";
+}
+
+TEST(Icp, TooLittleToAlignDoesNotConverge) {
+  const SurfaceCloud a(thin_scan(SyntheticWorld::at(0, 0, 0)));
+  const SurfaceCloud nothing(ThinCloud{}), one(thin(std::vector<Point>{{1, 2, 3, 0}}, {}, 1.0));
+  for (const SurfaceCloud* each : {&nothing, &one}) {
+    EXPECT_FALSE(align_icp(a, each->points(), Pose::Identity()).converged);
+    EXPECT_FALSE(align_icp(*each, a.points(), Pose::Identity()).converged);
+    EXPECT_EQ(measure_agreement(a, *each, Pose::Identity(), 0.4).inlier_ratio, 0.0);
+  }
+}
+
+}  // namespace
+}  // namespace revisit
