@@ -19,7 +19,7 @@ struct Registration {
   static constexpr double kCoarse = 2.0, kCoarseFromHeading = 4.0, kFine = 0.5;
   // Good enough to judge; other places are noticed early (docs/accuracy.md, cost).
   static constexpr double kSettled_m = 1e-3, kLeastMatched = 0.12;
-  static constexpr int kMostIterations = 100;  ///< after 60 one accepted pose in 345 was still on its way, 0.6 m off
+  static constexpr int kMostIterations = 100;      ///< after 60 one accepted pose in 345 had not converged, 0.6 m off
   static constexpr double kFeatureRadius_m = 3.0;  ///< neighbourhood of an FPFH feature
 };
 
