@@ -83,9 +83,11 @@ def main():
             found += is_found
             if not is_found:
                 missed.append(f"{file.relative_to(tree)}:{number + 1}: {was.strip()}  ->  {line.strip()}")
+                print(f"not found: {missed[-1]}", file=sys.stderr)
             print(f"{module}: {i + 1} of {len(mutants)}, {found} found", file=sys.stderr, flush=True)
         print(f"| {module} | {len(mutants)} | {found} | {found / max(1, len(mutants)):.0%} |", flush=True)
     print("\nNot found:\n" + "\n".join(missed))
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -74,6 +74,72 @@ TEST(KeyframeGraph, ASegmentIsAttachedByALoopIntoWhatWasBefore) {
   EXPECT_FALSE(drive.graph.last_attached());
 }
 
+TEST(KeyframeGraph, OfTwoPartsTheLaterOneMovesToWhereTheLoopHasIt) {
+  for (const bool is_turned : {false, true}) {
+    OutAndBack drive;
+    TrajectoryPoint point{.segment = 1};
+    const KeyframeGraph::OdometryEdge step{planar_pose(1, 0, 0), Matrix6::Identity()};
+    for (int i = 0; i < 3; ++i) {
+      drive.graph.add_keyframe({100 + i}, point, step, i == 0 ? std::optional(planar_pose(500, 0, 2)) : std::nullopt);
+      point = point.after(planar_pose(1, 0, 0));
+    }
+    EXPECT_TRUE(drive.graph.T_world_lidar({100}).isApprox(planar_pose(500, 0, 2))) << "where it is said to be";
+    EXPECT_TRUE(drive.graph.T_world_lidar({101}).isApprox(planar_pose(500, 0, 2) * planar_pose(1, 0, 0)));
+    LoopConstraint loop = OutAndBack::loop(0);
+    const Pose T_3_101 = planar_pose(0.5, 0.2, 0.1), T_world_3 = drive.graph.T_world_lidar({3});
+    loop.match = is_turned ? FrameId{101} : FrameId{3};
+    loop.query = is_turned ? FrameId{3} : FrameId{101};
+    loop.T_match_query = is_turned ? T_3_101.inverse() : T_3_101;
+    EXPECT_EQ(drive.graph.part({101}), 1);
+    drive.graph.add_loop(loop);
+    EXPECT_EQ(drive.graph.part({101}), 0);
+    EXPECT_TRUE(drive.graph.T_world_lidar({3}).isApprox(T_world_3));
+    EXPECT_TRUE(drive.graph.T_world_lidar({101}).isApprox(T_world_3 * T_3_101));
+    EXPECT_TRUE(drive.graph.T_world_lidar({102}).isApprox(T_world_3 * T_3_101 * planar_pose(1, 0, 0)));
+  }
+}
+
+TEST(KeyframeGraph, SettlesAtTheLatestAfterTwentyKeyframes) {
+  OutAndBack drive;
+  const auto place = [&] { return drive.graph.T_world_lidar({kKeyframes - 1}).translation().eval(); };
+  const Eigen::Vector3d before = place();
+  ASSERT_TRUE(drive.graph.settle_if_due());
+  EXPECT_EQ(place(), before) << "without loops there is nothing to settle";
+  EXPECT_TRUE(drive.graph.is_settled());
+  drive.graph.add_loop(OutAndBack::loop(38));
+  EXPECT_FALSE(drive.graph.is_settled());
+  ASSERT_TRUE(drive.graph.settle_if_due());
+  EXPECT_NE(place(), before) << "40 key frames since";
+  EXPECT_TRUE(drive.graph.is_settled());
+  drive.graph.add_loop(OutAndBack::loop(36));
+  TrajectoryPoint point = drive.graph.last_point();
+  for (int more = 1; more <= 20; ++more) {
+    ASSERT_TRUE(drive.graph.settle_if_due());
+    EXPECT_FALSE(drive.graph.is_settled()) << more;
+    point = point.after(planar_pose(1, 0, 0));
+    drive.graph.add_keyframe({200 + more}, point,
+                             KeyframeGraph::OdometryEdge{planar_pose(1, 0, 0), Matrix6::Identity()});
+  }
+  ASSERT_TRUE(drive.graph.settle_if_due());
+  EXPECT_TRUE(drive.graph.is_settled());
+}
+
+TEST(KeyframeGraph, FixesPlaceThePartsOnTheEarth) {
+  OutAndBack drive;
+  const Pose T_earth_world = planar_pose(1000, -300, 0.7);
+  std::vector<KeyframeGraph::Fix> fixes;
+  for (int i = 0; i < kKeyframes / 2; ++i)
+    fixes.push_back({{i}, T_earth_world * planar_pose(i, 0, 0).translation(), Eigen::Vector3d::Constant(0.1)});
+  fixes.push_back({.keyframe = {999}});  // of a scan that is no key frame
+  const auto placed = drive.graph.settle_on_earth(fixes, {});
+  ASSERT_TRUE(placed) << placed.error().message;
+  ASSERT_EQ(placed->size(), 1u);
+  EXPECT_NEAR(yaw_of(placed->at(0)), 0.7, 0.02);
+  EXPECT_NEAR((drive.graph.T_world_lidar({19}).translation() - drive.graph.T_world_lidar({0}).translation()).norm(),
+              19.0, 0.3)
+      << "odometry alone says 19.95";
+}
+
 // Two sessions along one level road, 1 m a key frame, whose odometry pitches evenly; each has its accelerometer, which
 // is off by its own. Gravity takes the drift out of the height, and neither offset bends the road.
 TEST(KeyframeGraph, GravityOfTwoSessions) {

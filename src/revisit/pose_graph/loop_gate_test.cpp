@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/pose_graph/loop_gate.hpp>
 
+#include <optional>
 #include <stdexcept>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -40,6 +42,48 @@ TEST(LoopGate, LoopsThatContradictDoNotLetEachOtherIn) {
   EXPECT_TRUE(gate.offer(loop(1010, 10, 0.2)).empty());
   EXPECT_TRUE(gate.offer(loop(1012, 30, 0.1)).empty()) << "18 m off";
   for (const auto& decision : gate.decide_all()) EXPECT_FALSE(decision.enters);
+}
+
+// By 4.02 m of odometry between them, loops may be off by 0.5 m and 2 in a hundred, 3 degrees and 0.05 a metre.
+TEST(LoopGate, LoopsAgreeWithinWhatOdometryIsOff) {
+  const auto agree = [](double off_m, double off_deg) {
+    LoopGate gate = gate_of_two_visits();
+    EXPECT_TRUE(gate.offer(loop(1010, 10, 0.0)).empty());
+    LoopConstraint second = loop(1012, 12, 0.0);
+    second.T_match_query = planar_pose(off_m, 0, to_radians(off_deg));
+    return !gate.offer(second).empty();
+  };
+  // Odometry is 2 cm longer between the queries than between the matches.
+  EXPECT_TRUE(agree(0.59, 0));
+  EXPECT_FALSE(agree(0.61, 0));
+  EXPECT_TRUE(agree(-0.55, 0));
+  EXPECT_FALSE(agree(-0.57, 0));
+  EXPECT_TRUE(agree(0, 3.15));
+  EXPECT_FALSE(agree(0, 3.25));
+}
+
+TEST(LoopGate, LoopsFarFromEachOtherAreNotCompared) {
+  for (const int apart : {38, 42}) {  // of queries and matches together, 80 m
+    LoopGate gate = gate_of_two_visits();
+    EXPECT_TRUE(gate.offer(loop(1010, 10, 0.0)).empty());
+    EXPECT_EQ(gate.offer(loop(1010 + apart, 10 + apart, 0.0)).size(), apart < 40 ? 2u : 0u) << apart;
+  }
+}
+
+TEST(LoopGate, CountsThoseThatAgreeAndRemembersWhatEntered) {
+  LoopGate gate = gate_of_two_visits();
+  gate.restore(loop(1008, 8, 0.0));
+  gate.restore(loop(1010, 10, 0.0));
+  gate.restore(loop(1012, 40, 0.0));
+  const auto third = gate.offer(loop(1012, 12, 0.0));
+  ASSERT_EQ(third.size(), 1u);
+  EXPECT_TRUE(third[0].enters);
+  EXPECT_EQ(third[0].agreeing, 2u);
+  EXPECT_TRUE(gate.has(FrameId{1099}));
+  EXPECT_TRUE(gate.has(FrameId{0}));
+  EXPECT_FALSE(gate.has(FrameId{1100}));
+  EXPECT_FALSE(gate.has(FrameId{500}));
+  EXPECT_EQ(gate.keyframes(), 200u);
 }
 
 TEST(LoopGate, AloneOnlyTheSureEnter) {
@@ -101,6 +145,40 @@ LoopGate gate_that_lost_track(double gap_m) {
       for (const auto& decision : gate.offer(after)) gate.join(decision.loop);
   }
   return gate;
+}
+
+// What a session needs to be joined: at least six loops that agree, over 20 m, and none against them.
+TEST(LoopGate, SessionsAreJoinedByManyLoopsOverALongWay) {
+  const auto joined_by = [](int count, int every_m, const std::optional<LoopConstraint>& against) {
+    LoopGate gate;
+    for (int session = 0; session < 2; ++session) {
+      TrajectoryPoint point{.segment = session, .origin = session};
+      for (int i = 0; i < 60; ++i) {
+        gate.add_keyframe(in_map(session, {i}), point);
+        point = point.after(planar_pose(1, 0, 0));
+      }
+    }
+    std::vector<LoopConstraint> loops;
+    for (int i = 0; i < count; ++i) loops.push_back(loop(0, every_m * i, 0.0, 0.9999));
+    for (int i = 0; i < count; ++i) loops[static_cast<std::size_t>(i)].query = in_map(1, {every_m * i});
+    if (against) loops.insert(loops.begin(), *against);
+    std::size_t entered = 0;
+    for (const LoopConstraint& each : loops)
+      for (const auto& decision : gate.offer(each)) {
+        entered += decision.enters;
+        if (decision.enters) gate.join(decision.loop);
+      }
+    for (const auto& decision : gate.decide_all()) EXPECT_FALSE(decision.enters) << "however sure, not alone";
+    EXPECT_EQ(gate.part(in_map(1, {0})), entered > 0 ? 0 : 1);
+    return entered;
+  };
+  EXPECT_EQ(joined_by(6, 5, std::nullopt), 6u) << "the sixth, with five over exactly 20 m before it";
+  EXPECT_EQ(joined_by(5, 10, std::nullopt), 0u) << "five";
+  EXPECT_EQ(joined_by(21, 1, std::nullopt), 0u) << "19 m before the last one";
+  EXPECT_EQ(joined_by(22, 1, std::nullopt), 22u);
+  LoopConstraint against = loop(0, 31, 0.0);
+  against.query = in_map(1, {5});
+  EXPECT_EQ(joined_by(6, 5, against), 0u) << "another loop says 26 m on";
 }
 
 TEST(LoopGate, ASessionGoesOnWhereItLostTrack) {

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <map>
 #include <random>
 #include <stdexcept>
 
@@ -137,6 +138,87 @@ TEST(PoseGraph, BrokenFilesAreRefusedByLine) {
   std::filesystem::remove(file);
 }
 
+TEST(PoseGraph, ForeignFilesAreReadAndWrongEdgesRefused) {
+  const auto file = std::filesystem::temp_directory_path() / ("revisit_edges_" + std::to_string(::getpid()) + ".g2o");
+  const auto read = [&](const std::string& text) {
+    std::ofstream(file) << text;
+    return PoseGraph::read_g2o(file);
+  };
+  const std::string head =
+                        "# a comment\n\nVERTEX_SE3:QUAT 7 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 3 1 2 3 0 0 0.002 1\nFIX 7\n",
+                    motion = " 1 2 3 0 0 0 1", numbers = " 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21\n";
+  const auto graph = read(head + "EDGE_SE3:QUAT 7 3" + motion + numbers + "EDGE_SE3:QUAT 3 7" + motion + numbers);
+  ASSERT_TRUE(graph) << graph.error().message;
+  ASSERT_EQ(graph->nodes().size(), 2u);
+  EXPECT_NEAR(graph->nodes()[1].linear().determinant(), 1.0, 1e-12) << "a quaternion that was rounded";
+  const PoseEdge& edge = graph->edges()[0];
+  EXPECT_EQ(edge.to, edge.from + 1) << "numbers of vertices need not follow each other";
+  EXPECT_FALSE(edge.is_loop);
+  EXPECT_TRUE(graph->edges()[1].is_loop);
+  EXPECT_DOUBLE_EQ(edge.information(0, 5), 6.0 / 2.0) << "g2o counts half a rotation";
+  EXPECT_DOUBLE_EQ(edge.information(5, 0), 6.0 / 2.0);
+  EXPECT_DOUBLE_EQ(edge.information(1, 1), 7.0);
+  EXPECT_DOUBLE_EQ(edge.information(5, 5), 21.0 / 4.0);
+  for (const auto& [line, why] : std::map<std::string, std::string>{
+           {"EDGE_SE3:QUAT 7 7" + motion + numbers, ":6: leads from vertex 7 to 7; allowed: two different ones"},
+           {"EDGE_SE3:QUAT 7 4" + motion + numbers, ":6: leads from vertex 7 to 4"},
+           {"EDGE_SE3:QUAT 4 7" + motion + numbers, ":6: leads from vertex 4 to 7"},
+           {"EDGE_SE3:QUAT 7" + motion + "\n", ":6: is no edge"},
+           {"EDGE_SE3:QUAT x 3" + motion + numbers, ":6: is no edge"},
+           {"EDGE_SE3:QUAT 7 3 1 2 3 0 0 0 0.9" + numbers, ":6: is no edge"}}) {
+    const auto refused = read(head + line);
+    ASSERT_FALSE(refused) << line;
+    EXPECT_NE(refused.error().message.find(why), std::string::npos) << refused.error().message;
+  }
+  std::filesystem::remove(file);
+  EXPECT_NE(PoseGraph::read_g2o(file).error().message.find("cannot be opened"), std::string::npos);
+  EXPECT_FALSE(graph->write_g2o(file / "no such folder"));
+}
+
+TEST(PoseGraph, AnErrorIsMeasuredFromWhereTheEdgeEnds) {
+  PoseEdge edge;
+  edge.T_from_to = planar_pose(2, 0, kPi / 2);
+  edge.information.diagonal() << 1, 10, 100, 1000, 10000, 100000;
+  const Pose T_world_from = planar_pose(5, -3, 0.4);
+  EXPECT_NEAR(squared_error(edge, T_world_from, T_world_from * edge.T_from_to), 0.0, 1e-12);
+  EXPECT_NEAR(squared_error(edge, T_world_from, T_world_from * planar_pose(2.1, 0, kPi / 2)), 10 * 0.01, 1e-9)
+      << "ahead at its beginning is to the side at its end";
+  EXPECT_NEAR(squared_error(edge, T_world_from, T_world_from * planar_pose(2, 0, kPi / 2 + 0.01)), 1e5 * 1e-4, 1e-9);
+}
+
+TEST(PoseGraph, ReadingsOfGravityThatCannotBeAreRefused) {
+  PoseGraph graph;
+  graph.add_node(Pose::Identity());
+  const UpReading right;
+  EXPECT_NO_THROW(graph.set_ups({right}));
+  const auto refuses = [&](auto change) {
+    UpReading wrong = right;
+    change(wrong);
+    EXPECT_THROW(graph.set_ups({right, wrong}), std::invalid_argument);
+  };
+  refuses([](UpReading& each) { each.node = 1; });
+  refuses([](UpReading& each) { each.sensor = -1; });
+  refuses([](UpReading& each) { each.part = -1; });
+  refuses([](UpReading& each) { each.deviation_rad = 0.0; });
+  refuses([](UpReading& each) { each.deviation_rad = std::nan(""); });
+  refuses([](UpReading& each) { each.up *= 1.1; });
+  refuses([](UpReading& each) { each.up *= 0.9; });
+}
+
+// One loop is bent by the odometry around it: believed in full up to a squared error of 22, not at all beyond.
+TEST(PoseGraph, ALoopIsBelievedOrRefusedAsAWhole) {
+  const auto weight_at = [](double off_deviations) {
+    PoseGraph graph;
+    for (int i = 0; i < 3; ++i) graph.add_node(planar_pose(i, 0, 0));
+    for (std::size_t i = 0; i < 2; ++i) graph.add_edge({i, i + 1, planar_pose(1, 0, 0), 1e10 * Matrix6::Identity()});
+    graph.add_edge({0, 2, planar_pose(2.0 + 0.1 * off_deviations, 0, 0), 100.0 * Matrix6::Identity(), true});
+    EXPECT_TRUE(graph.optimise());
+    return graph.edges().back().weight;
+  };
+  EXPECT_EQ(weight_at(4.7), 1.0);
+  EXPECT_EQ(weight_at(4.8), 0.0);
+}
+
 TEST(PoseGraph, EdgesThatCannotBeAreRefused) {
   PoseGraph graph;
   EXPECT_TRUE(graph.optimise()) << "nothing to do";
@@ -145,8 +227,22 @@ TEST(PoseGraph, EdgesThatCannotBeAreRefused) {
   EXPECT_THROW(graph.add_edge(edge), std::invalid_argument);
   graph.add_node(planar_pose(1, 0, 0));
   edge.to = 1;
-  edge.information(0, 0) = std::nan("");
-  EXPECT_THROW(graph.add_edge(edge), std::invalid_argument);
+  EXPECT_NO_THROW(graph.add_edge(edge));
+  PoseEdge wrong = edge;
+  wrong.information(0, 0) = std::nan("");
+  EXPECT_THROW(graph.add_edge(wrong), std::invalid_argument);
+  wrong = edge;
+  wrong.information(0, 1) = 0.5;
+  EXPECT_THROW(graph.add_edge(wrong), std::invalid_argument) << "not symmetric";
+  wrong = edge;
+  wrong.T_from_to.translation().x() = std::nan("");
+  EXPECT_THROW(graph.add_edge(wrong), std::invalid_argument);
+  for (const auto& [from, to] : {std::pair{0u, 2u}, {2u, 0u}, {1u, 1u}}) {
+    wrong = edge;
+    wrong.from = from;
+    wrong.to = to;
+    EXPECT_THROW(graph.add_edge(wrong), std::invalid_argument);
+  }
 }
 
 }  // namespace

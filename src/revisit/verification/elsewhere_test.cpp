@@ -37,6 +37,9 @@ TEST(Elsewhere, IsWhatLooksTheSameTurned) {
   ASSERT_TRUE(refusal);
   EXPECT_EQ(refusal->reason, Refusal::Reason::kOtherHeading);
   EXPECT_NEAR(refusal->value, 90.0, 1e-9);
+  EXPECT_NEAR(refusal->limit, 40.0 + 0.02 * (10.0 + 2.0 * to_radians(30.0)), 1e-9) << "a turn counts as metres";
+  EXPECT_FALSE(refuse_heading(std::nullopt, query, planar_pose(8.0, 0.0, to_radians(120.0))));
+  EXPECT_FALSE(refuse_heading(place, std::nullopt, planar_pose(8.0, 0.0, to_radians(120.0))));
   EXPECT_FALSE(refuse_heading(place, lost, planar_pose(8.0, 0.0, to_radians(120.0))));
 }
 
@@ -73,6 +76,31 @@ TEST(Elsewhere, IsNotKnownWithoutOdometry) {
   EXPECT_TRUE(refuse_elsewhere(place, place.after_gap(planar_pose(1000.0, 0.0, 0.0), 2.0)));
   EXPECT_FALSE(refuse_elsewhere(place, place.after_gap(planar_pose(1000.0, 0.0, 0.0), 1000.0)));
   EXPECT_FALSE(refuse_elsewhere(place, lost)) << "tracking was lost in between";
+}
+
+TEST(Elsewhere, TwoPosesOfOneQueryAreOthersBeyondWhatOdometryMayBeOff) {
+  const TrajectoryPoint a{.segment = 1, .origin = 1}, b = a.after(planar_pose(10.0, 0.0, 0.0));
+  const auto are_other = [&](double b_to_query_m) {  // from a the query is seen 12 m ahead
+    return are_other_poses(a, planar_pose(12.0, 0.0, 0.0), b, planar_pose(b_to_query_m, 0.0, 0.0));
+  };
+  EXPECT_FALSE(are_other(2.0)) << "the same pose, seen from both";
+  EXPECT_FALSE(are_other(3.5)) << "1 m, and 6 in a hundred of the 10 m in between";
+  EXPECT_TRUE(are_other(3.7));
+  EXPECT_FALSE(are_other(0.5));
+  EXPECT_FALSE(are_other_poses(a, Pose::Identity(), lost, planar_pose(50.0, 0.0, 0.0))) << "nobody knows";
+}
+
+TEST(PlacesElsewhere, AreAtMostSixtyTheLatestFirst) {
+  TrajectoryPoints places;
+  TrajectoryPoint point{.segment = 3};
+  for (int frame = 0; frame < 200; ++frame) {
+    places[FrameId{frame}] = point;
+    point = point.after(planar_pose(1.0, 0.0, 0.0));
+  }
+  const auto known = places_elsewhere(places, point);
+  ASSERT_EQ(known.size(), 60u);
+  EXPECT_EQ(known.front().value, 184);
+  EXPECT_EQ(known.back().value, 125);
 }
 
 TEST(PlacesElsewhere, AreThoseThatOdometryKnowsToBe) {

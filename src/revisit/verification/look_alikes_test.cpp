@@ -44,6 +44,18 @@ TEST(LookAlikes, InAMapWhatIsAlikeHasAnEnd) {
   EXPECT_GT(with_scores(-15.0, 1.5, 300).log_odds_in_map(), 2.0) << "nothing is alike";
 }
 
+// Twenty scores a fifth apart; of them the highest eighth makes the tail, and what is usual counts as thirty more.
+TEST(LookAlikes, TheEndOfTheTailIsThatOfItsMeanExcess) {
+  LookAlikes alike;
+  for (int i = 0; i < 40; ++i) alike.add(-3.0 + 0.2 * i);  // up to 4.8, the tail from 3.2 on: eight with a mean of 0.9
+  const double end = 3.2 - 0.9 * std::log(1e-3 * 40.0 / 8.0);
+  EXPECT_NEAR(alike.log_odds(), 40.0 / 70.0 * std::max(-3.0, 3.0 - end), 1e-9);
+  LookAlikes rarely = LookAlikes();
+  for (int i = 0; i < 40; ++i) rarely.add(-9.0 + 0.2 * i);
+  EXPECT_EQ(rarely.log_odds(), 0.0);
+  EXPECT_NEAR(rarely.log_odds_in_map(), 40.0 / 70.0 * (3.0 - (end - 6.0)), 1e-9) << "less is asked in a map alone";
+}
+
 TEST(LookAlikes, WhatWasNotWorthRegisteringMakesNoTail) {
   LookAlikes alike;
   for (int i = 0; i < 200; ++i) alike.add(LookAlikes::kNotRegistered);

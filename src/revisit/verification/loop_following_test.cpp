@@ -50,8 +50,55 @@ TEST(LoopFollowing, SupportsThePoseThatOdometryLeadsToAndNoOther) {
   EXPECT_EQ(support(12, 12, planar_pose(0, 0.4, 0.1)), 0.0) << "6 degrees off";
   EXPECT_GT(support(12, 12, planar_pose(0, 0.4, 0)), support(25, 25, planar_pose(0, 0.4, 0)) + 0.5)
       << "the farther, the less";
+  EXPECT_NEAR(support(12, 12, planar_pose(0, 0.4, 0)), 7.8, 1e-9) << "8 at most, and 0.1 less for each metre";
+  EXPECT_NEAR(support(12, 12, planar_pose(0.27, 0.4, 0)), 7.8, 1e-9) << "0.2 m, and 0.08 for 2 m of query and of place";
+  EXPECT_EQ(support(12, 12, planar_pose(0.29, 0.4, 0)), 0.0);
   EXPECT_EQ(support(45, 45, planar_pose(0, 0.4, 0)), 0.0) << "too far to rely on odometry";
   EXPECT_EQ(support(12, 50, planar_pose(-38, 0.4, 0)), 0.0) << "on the side of the places too";
+}
+
+TEST(LoopFollowing, CarriesLessTheFartherItIsAndNeverMoreThanTheMost) {
+  EXPECT_DOUBLE_EQ(LoopFollowing::carried(3.0, 0.0), 3.0);
+  EXPECT_DOUBLE_EQ(LoopFollowing::carried(3.0, 10.0), 2.0);
+  EXPECT_DOUBLE_EQ(LoopFollowing::carried(20.0, 10.0), 7.0) << "8 at most";
+  EXPECT_DOUBLE_EQ(LoopFollowing::carried(3.0, 40.0), 0.0) << "it never speaks against a pose";
+}
+
+TEST(LoopFollowing, PosesAgreeMoreLooselyTheFartherTheMotion) {
+  const auto agrees = [](double off_m, double off_rad, double motion_m) {
+    return agree(Pose::Identity(), planar_pose(off_m, 0, off_rad), motion_m);
+  };
+  EXPECT_TRUE(agrees(0.19, 0, 0));
+  EXPECT_FALSE(agrees(0.21, 0, 0));
+  EXPECT_TRUE(agrees(0.39, 0, 10));
+  EXPECT_FALSE(agrees(0.41, 0, 10));
+  EXPECT_TRUE(agrees(0, 0.019, 0));
+  EXPECT_FALSE(agrees(0, 0.021, 0));
+  EXPECT_TRUE(agrees(0, 0.029, 10));
+  EXPECT_FALSE(agrees(0, 0.031, 10));
+}
+
+TEST(LoopFollowing, OfLoopsAsSureTheLatestPredictsAndTwentyAreRemembered) {
+  const TwoRounds drive;
+  LoopFollowing following;
+  const auto add = [&](int i, double y_m, double log_odds) {
+    const auto& query = drive.again[static_cast<std::size_t>(i)];
+    following.add(query, FrameId{i}, *drive.places.at(FrameId{i}), planar_pose(0, y_m, 0), log_odds);
+  };
+  const auto predicted_y_m = [&] {
+    return following.predict(drive.again[10], drive.places, TwoRounds::kNewest)->T_match_query.translation().y();
+  };
+  add(10, 0.1, kSure);
+  add(10, 0.2, kSure);
+  EXPECT_NEAR(predicted_y_m(), 0.2, 1e-9);
+  add(10, 0.3, 5.0);
+  EXPECT_NEAR(predicted_y_m(), 0.2, 1e-9) << "less sure";
+  add(7, 0.4, kSure);
+  EXPECT_NEAR(predicted_y_m(), 0.2, 1e-9) << "as sure, but 3 m away";
+  for (int more = 0; more < 17; ++more) add(10, 0.5, 1.0);
+  EXPECT_NEAR(predicted_y_m(), 0.2, 1e-9) << "the first of 21 is gone, the second is not";
+  add(10, 0.5, 1.0);
+  EXPECT_NEAR(predicted_y_m(), 0.4, 1e-9);
 }
 
 // A scan in an open field is not sure alone, with log odds of 1.5; each is worth what it shows and what led to it.
@@ -101,6 +148,12 @@ TEST(NearestPlace, IsTheOneWithTheShortestTranslationAmongConnectedOnes) {
   drive.places.at(FrameId{12}).reset();
   EXPECT_EQ(nearest_place(drive.places, FrameId{10}, planar_pose(3.2, 0.4, 0), TwoRounds::kNewest)->match, FrameId{11})
       << "odometry failed at 12: what lies behind is not connected";
+  EXPECT_EQ(nearest_place(drive.places, FrameId{10}, planar_pose(-10.2, 0.4, 0), TwoRounds::kNewest)->match, FrameId{0})
+      << "the first place counts, too";
+  EXPECT_EQ(nearest_place(drive.places, FrameId{59}, planar_pose(-50, 0, 0), TwoRounds::kNewest)->match, FrameId{29})
+      << "no farther than odometry is relied on";
+  EXPECT_FALSE(nearest_place(drive.places, FrameId{12}, Pose::Identity(), TwoRounds::kNewest)) << "not on the drive";
+  EXPECT_FALSE(nearest_place(drive.places, FrameId{200}, Pose::Identity(), TwoRounds::kNewest)) << "not known";
 }
 
 }  // namespace

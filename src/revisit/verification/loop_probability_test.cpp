@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/verification/loop_probability.hpp>
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 namespace revisit {
@@ -46,6 +48,50 @@ TEST(LoopProbability, EachPieceOfEvidenceCounts) {
   EXPECT_LT(after([](LoopEvidence& e) { e.least_fixed = 0.01; }), before - 1.0) << "it may slide along a wall";
   EXPECT_LT(after([](LoopEvidence& e) { e.inliers = 100; }), before - 1.0) << "few points may fit by chance";
   EXPECT_GT(after([](LoopEvidence& e) { e.distance_m += 4.0; }), before) << "from afar less must fit";
+}
+
+// Worked out apart from the program, from the coefficients that were learnt.
+TEST(LoopProbability, IsTheModelThatWasLearnt) {
+  LoopEvidence evidence{.inlier_share = 0.6,
+                        .hidden_share = 0.25,
+                        .free_space_agreement = 0.95,
+                        .intensity_agreement = 0.8,
+                        .rmse_m = 0.12,
+                        .voxel_m = 0.8,
+                        .least_fixed = 0.04,
+                        .inliers = 150,
+                        .distance_m = 5.0};
+  LoopEvidence in_room = evidence;
+  in_room.in_the_open = false;
+  EXPECT_NEAR(loop_log_odds(evidence), -3.373592623, 1e-8);
+  EXPECT_NEAR(loop_log_odds(in_room), -10.781122114, 1e-8);
+  LoopEvidence far = evidence;
+  far.distance_m = 20.0;
+  evidence.distance_m = 12.0;
+  EXPECT_DOUBLE_EQ(loop_log_odds(far), loop_log_odds(evidence)) << "nothing was learnt beyond 12 m";
+  evidence.distance_m = 5.0;
+  for (LoopEvidence* each : {&evidence, &in_room}) each->intensity_agreement.reset();
+  EXPECT_NEAR(loop_log_odds(evidence), -3.045077178, 1e-8);
+  EXPECT_NEAR(loop_log_odds(in_room), -10.467660605, 1e-8);
+  in_room.both_are_narrow = true;
+  EXPECT_NEAR(loop_log_odds(in_room), -10.467660605, 1e-8) << "rooms were learnt on with narrow views";
+  evidence.both_are_narrow = true;
+  EXPECT_NEAR(loop_log_odds(evidence), -6.045077178, 1e-8);
+  evidence.one_is_narrow = true;
+  EXPECT_NEAR(loop_log_odds(evidence), -8.045077178, 1e-8);
+}
+
+TEST(LoopProbability, IntensitiesOfTwoSensorsAreComparableOrNot) {
+  LoopEvidence evidence = usual_revisit();
+  evidence.intensity_agreement = 0.2;
+  const double with = loop_log_odds(evidence);
+  evidence.sensors_differ = true;
+  const double either = loop_log_odds(evidence);
+  evidence.intensity_agreement.reset();
+  const double without = loop_log_odds(evidence);
+  ASSERT_GT(without, with + 1.0);
+  EXPECT_NEAR(std::exp(either), 0.5 * (std::exp(with) + std::exp(without)), 1e-9 * std::exp(without))
+      << "the mean of both odds";
 }
 
 TEST(LoopProbability, ASectorOfAStreetDecidesNothingAlone) {

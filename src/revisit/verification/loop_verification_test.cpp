@@ -5,75 +5,15 @@
 
 #include <gtest/gtest.h>
 
-#include <revisit/descriptors/similarity.hpp>
-
-#include "synthetic_world.hpp"
+#include "remembered_places.hpp"
 
 namespace revisit {
 namespace {
 
+using testing_support::described;
+using testing_support::Described;
 using testing_support::SyntheticWorld;
-
-struct Described {
-  IntensityScanContext descriptor;
-  ThinCloud cloud;
-};
-
-Described described(const SyntheticWorld& world, const Pose& T_world_lidar) {
-  const Scan scan = world.scan(T_world_lidar, {32, 900, -24.8, 5.0});
-  std::vector<std::uint8_t> ground;
-  for (const Point& p : scan.points) ground.push_back(p.z < -1.6f);
-  return {describe(scan.points, {}), thin_for_registration(scan.points, ground)};
-}
-
-// Places along x, a metre apart, frame by frame, and one of another world as frame 90.
-class LoopVerificationTest : public testing::Test {
- protected:
-  LoopVerificationTest() {
-    TrajectoryPoint point;
-    for (int i = 0; i < 6; ++i) {
-      add(i, described(home_, SyntheticWorld::at(i, 0, 0)), point);
-      point = point.after(planar_pose(1, 0, 0));
-    }
-    add(90, described(SyntheticWorld(52), SyntheticWorld::at(0, 0, 0)), std::nullopt);
-  }
-  void add(int frame, Described place, const std::optional<TrajectoryPoint>& point) {
-    descriptors_[FrameId{frame}] = place.descriptor;
-    ASSERT_TRUE(clouds_->put(FrameId{frame}, std::move(place.cloud)));
-    points_[FrameId{frame}] = point;
-  }
-  VerificationContext context() {
-    return {.parameters = parameters_,
-            .clouds = *clouds_,
-            .geometries = geometries_,
-            .query_descriptor = [](FrameId) { return std::nullopt; },
-            .place_descriptor = [this](FrameId frame) -> std::optional<DescriptorView> {
-              const auto found = descriptors_.find(frame);
-              if (found == descriptors_.end()) return std::nullopt;
-              return found->second;
-            },
-            .places = points_,
-            .following = following_,
-            .typical = {},
-            .newest = FrameId{90}};
-  }
-  std::vector<LoopCandidate> candidates(const Described& query, const std::vector<int>& frames) const {
-    std::vector<LoopCandidate> all;
-    for (const int frame : frames) {
-      all.push_back(match_descriptors(query.descriptor, descriptors_.at(FrameId{frame})));
-      all.back().match = FrameId{frame};
-    }
-    return all;
-  }
-
-  const SyntheticWorld home_{51};
-  Parameters parameters_;
-  std::unique_ptr<PlaceClouds> clouds_ = clouds_in_memory();
-  PlaceGeometries geometries_;
-  std::map<FrameId, IntensityScanContext> descriptors_;
-  TrajectoryPoints points_;
-  LoopFollowing following_;
-};
+using LoopVerificationTest = testing_support::RememberedPlaces;
 
 TEST_F(LoopVerificationTest, TheRightCandidateWinsWhereverItStandsInTheList) {
   const Described query = described(home_, SyntheticWorld::at(2.2, 0.3, 3.0));
@@ -172,6 +112,43 @@ TEST_F(LoopVerificationTest, AFollowedLoopIsTestedFirstAndAlone) {
   LoopVerification alone(without, question);
   ASSERT_TRUE(alone.verify(candidates(query, {0, 90})));
   EXPECT_GE(alone.hypotheses().size(), 2u);
+}
+
+TEST_F(LoopVerificationTest, AFollowedLoopThatIsFarAwayOrUnsureIsTestedBesideTheCandidates) {
+  const TrajectoryPoint before{.segment = 7}, now = before.after(planar_pose(1, 0, 0));
+  const Described query = described(home_, SyntheticWorld::at(5.0, 1.9, 0));
+  const VerificationQuery question{FrameId{1001}, query.descriptor, query.cloud, nullptr, now};
+  following_.add(before, FrameId{4}, *points_.at(FrameId{4}), planar_pose(0, 1.9, 0), 12.0);
+  const VerificationContext known = context();
+  LoopVerification verification(known, question);
+  const auto answer = verification.verify(candidates(query, {90}));
+  ASSERT_TRUE(answer && *answer);
+  EXPECT_EQ((*answer)->candidate.match, FrameId{5});
+  EXPECT_EQ(verification.hypotheses().back().candidate.match, FrameId{5}) << "1.9 m away: a candidate may be nearer";
+  EXPECT_GE(verification.hypotheses().size(), 2u);
+  LoopVerification once(known, question);
+  ASSERT_TRUE(once.verify(candidates(query, {5})));
+  EXPECT_EQ(once.hypotheses().size(), CandidateRegistration::kPosesAPlace) << "retrieval answered it, too";
+
+  following_ = {};
+  following_.add(before, FrameId{5}, *points_.at(FrameId{5}), planar_pose(6.0, 0, 0), 12.0);
+  LoopVerification out_of_reach(known, question);
+  EXPECT_FALSE(*out_of_reach.verify_again({})) << "7 m from the last place";
+}
+
+TEST_F(LoopVerificationTest, WhatStandsOutFromLookAlikesNeedsLessCautionInAMap) {
+  const Described query = described(home_, SyntheticWorld::at(2.2, 0.3, 0.0));
+  const auto own_log_odds = [&](double look_alikes, const std::optional<TrajectoryPoint>& point) {
+    VerificationContext known = context();
+    known.look_alikes_log_odds = look_alikes;
+    const VerificationQuery question{FrameId{1000}, query.descriptor, query.cloud, nullptr, point};
+    LoopVerification verification(known, question);
+    return verification.verify(candidates(query, {2})).operator*()->own_log_odds();
+  };
+  const double usual = own_log_odds(0.0, std::nullopt);
+  EXPECT_NEAR(own_log_odds(2.0, std::nullopt), usual + 2.0, 1e-9) << "nothing is alike: no caution to take away";
+  EXPECT_NEAR(own_log_odds(-2.0, std::nullopt), usual - 0.4, 1e-9) << "nothing else fits: a fifth of it is left";
+  EXPECT_NEAR(own_log_odds(-2.0, TrajectoryPoint{.segment = 9}), usual - 2.0, 1e-9) << "on a drive all of it";
 }
 
 TEST_F(LoopVerificationTest, APlaceThatCannotBeReadIsAnError) {

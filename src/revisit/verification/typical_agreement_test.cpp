@@ -52,6 +52,34 @@ TEST(TypicalAgreement, AfterAnInterruptionOnlyTheOverallOneIsKnown) {
   EXPECT_NEAR(estimate.recent().in_sight_ratio, 0.7, 0.01);
 }
 
+TEST(TypicalAgreement, IsTheMeanOfRatiosAndTheMedianOfCorrelations) {
+  TypicalAgreementEstimate estimate;
+  estimate.restore({0.6, 0.3}, 10);
+  estimate.restore({0.9, 0.8}, 20);
+  EXPECT_NEAR(estimate.overall().in_sight_ratio, 0.8, 1e-9);
+  EXPECT_NEAR(estimate.overall().intensity_correlation, 0.8, 1e-9);
+  estimate.restore({0.8, 0.02}, 31);
+  EXPECT_NEAR(estimate.overall().intensity_correlation, 0.1, 1e-9) << "as little as is believed";
+  EXPECT_EQ(estimate.pairs(), 61u);
+}
+
+TEST(TypicalAgreement, TheLastPairsCountMore) {
+  TypicalAgreementEstimate one, two;
+  one.add(scan_at(0), scan_at(1), planar_pose(0.5, 0, 0));
+  two.add(scan_at(0), scan_at(4), planar_pose(2.0, 0, 0));
+  const double first = one.recent().in_sight_ratio, second = two.recent().in_sight_ratio;
+  ASSERT_NE(first, second);
+  one.add(scan_at(0), scan_at(4), planar_pose(2.0, 0, 0));
+  EXPECT_NEAR(one.recent().in_sight_ratio, 0.7 * first + 0.3 * second, 1e-9);
+}
+
+TEST(TypicalAgreement, FromTheSameSpotIntensitiesAgreeTooWellToCount) {
+  TypicalAgreementEstimate estimate;
+  for (int i = 0; i < 12; ++i) estimate.add(scan_at(i), scan_at(i), Pose::Identity());
+  EXPECT_NE(estimate.overall().in_sight_ratio, TypicalAgreement{}.in_sight_ratio);
+  EXPECT_EQ(estimate.overall().intensity_correlation, TypicalAgreement{}.intensity_correlation);
+}
+
 TEST(TypicalAgreement, IntensitiesThatSayNothingLeaveTheirDefault) {
   TypicalAgreementEstimate estimate;
   for (int i = 0; i < 12; ++i) estimate.add(scan_at(i, false), scan_at(i + 1, false), planar_pose(0.5, 0, 0));

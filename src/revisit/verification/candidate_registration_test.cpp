@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/verification/candidate_registration.hpp>
+
+#include <gtest/gtest.h>
+
+#include <revisit/verification/look_alikes.hpp>
+
+#include "remembered_places.hpp"
+
+namespace revisit {
+namespace {
+
+using testing_support::described;
+using testing_support::Described;
+using testing_support::SyntheticWorld;
+
+// A scan beside place 2, a third of a turn to the left.
+class CandidateRegistrationTest : public testing_support::RememberedPlaces {
+ protected:
+  std::vector<Hypothesis> tested(const std::vector<int>& frames, const std::optional<TrajectoryPoint>& point = {}) {
+    const VerificationContext known = context();
+    const VerificationQuery question{FrameId{1000}, query_.descriptor, query_.cloud, nullptr, point};
+    return *CandidateRegistration(known, question).test(candidates(query_, frames));
+  }
+  Pose truth(int frame) const { return SyntheticWorld::at(frame, 0, 0).inverse() * T_world_query_; }
+
+  const Pose T_world_query_ = SyntheticWorld::at(2.3, 0.4, 2.1);
+  const Described query_ = described(home_, T_world_query_);
+};
+
+TEST_F(CandidateRegistrationTest, TheBestFromOverheadAreRegisteredAndNoMore) {
+  for (const int most : {1, 3, 4}) {
+    parameters_.geometric.candidates = most;
+    const auto found = tested({0, 2, 4});
+    ASSERT_EQ(found.size(), static_cast<std::size_t>(most));
+    for (std::size_t i = 1; i < found.size(); ++i) EXPECT_GE(found[i - 1].overlap, found[i].overlap);
+  }
+  EXPECT_EQ(tested({2}).size(), CandidateRegistration::kPosesAPlace) << "two poses a place";
+}
+
+TEST_F(CandidateRegistrationTest, OfARegisteredOneThePoseIsRight) {
+  const Hypothesis best = tested({2, 3}).front();
+  ASSERT_TRUE(best.geometric);
+  EXPECT_FALSE(best.refusal);
+  const Pose error = truth(static_cast<int>(best.candidate.match.value)).inverse() * best.geometric->T_match_query;
+  EXPECT_LT(error.translation().norm(), 0.1);
+  EXPECT_LT(rotation_angle(error), to_radians(0.3));
+}
+
+TEST_F(CandidateRegistrationTest, WithoutTheOverheadSearchTheHeadingOfTheDescriptorsIsTheStart) {
+  parameters_.geometric.overhead_search = false;
+  parameters_.geometric.candidates = 2;
+  const auto found = tested({2, 3, 4});
+  ASSERT_EQ(found.size(), 2u) << "as retrieval ordered them";
+  EXPECT_EQ(found[0].candidate.match, FrameId{2});
+  EXPECT_EQ(found[0].overlap, 0.0) << "not measured, and no objection";
+  EXPECT_NEAR(found[0].T_guess_match_query.translation().norm(), 0.0, 1e-6);
+  EXPECT_NEAR(yaw_of(found[0].T_guess_match_query), found[0].candidate.yaw_rad, 1e-6);
+  EXPECT_TRUE(found[0].is_accepted());
+}
+
+TEST_F(CandidateRegistrationTest, WhatOdometryKnowsToBeElsewhereIsNotRegistered) {
+  const TrajectoryPoint far = points_.at(FrameId{5})->after(planar_pose(300.0, 0, 0));
+  const auto found = tested({2, 3}, far);
+  ASSERT_EQ(found.size(), 1u) << "the first of them says why";
+  EXPECT_EQ(found[0].candidate.match, FrameId{2});
+  ASSERT_TRUE(found[0].refusal);
+  EXPECT_EQ(found[0].refusal->reason, Refusal::Reason::kElsewhere);
+  EXPECT_FALSE(found[0].geometric);
+  const auto another = tested({2, 90}, far);
+  for (const Hypothesis& each : another) EXPECT_EQ(each.candidate.match, FrameId{90}) << "of 90 it knows nothing";
+  parameters_.geometric.follow = false;
+  EXPECT_TRUE(tested({2, 3}, far).front().is_accepted()) << "without odometry";
+}
+
+TEST_F(CandidateRegistrationTest, WhereTrackWasLostInOneDriveOdometryNotKnowingSpeaksAgainstAPose) {
+  const auto log_odds = [&](bool is_one_drive, const std::optional<TrajectoryPoint>& point, FrameId frame) {
+    VerificationContext known = context();
+    known.is_one_drive = is_one_drive;
+    const VerificationQuery question{frame, query_.descriptor, query_.cloud, nullptr, point};
+    return CandidateRegistration(known, question).test(candidates(query_, {2}))->front().geometric->log_odds;
+  };
+  const TrajectoryPoint lost{.segment = 9, .origin = 9};
+  const double usual = log_odds(false, lost, FrameId{1000});
+  EXPECT_NEAR(log_odds(true, lost, FrameId{1000}), usual - 3.0, 1e-9);
+  EXPECT_NEAR(log_odds(true, std::nullopt, FrameId{1000}), usual, 1e-9) << "a scan alone was never tracked";
+  EXPECT_NEAR(log_odds(true, lost, FrameId{(std::int64_t{1} << 40) + 5}), usual, 1e-9) << "another session";
+}
+
+TEST_F(CandidateRegistrationTest, OfAPredictedPlaceOnlyThePoseIsOpen) {
+  const VerificationContext known = context();
+  const VerificationQuery question{FrameId{1000}, query_.descriptor, query_.cloud, nullptr, std::nullopt};
+  const auto log_odds = [&](const Pose& T_predicted, double sure) {
+    const auto found = CandidateRegistration(known, question).test(PosePrediction{FrameId{2}, T_predicted, sure});
+    EXPECT_LT((truth(2).inverse() * found->geometric->T_match_query).translation().norm(), 0.1);
+    return found->geometric->log_odds;
+  };
+  const double alone = log_odds(truth(2), 0.0);
+  EXPECT_NEAR(log_odds(truth(2), 5.0), alone + 5.0, 1e-9) << "it was sure of that pose";
+  EXPECT_NEAR(log_odds(truth(2) * planar_pose(0.6, 0, 0), 5.0), alone, 1e-6) << "0.6 m off: of another one";
+  EXPECT_FALSE(CandidateRegistration(known, question).test(PosePrediction{FrameId{55}, truth(2), 0.0}));
+}
+
+TEST_F(CandidateRegistrationTest, APlaceElsewhereIsScoredUnlessItIsThePlace) {
+  const VerificationContext known = context();
+  const VerificationQuery question{FrameId{1000}, query_.descriptor, query_.cloud, nullptr, std::nullopt};
+  CandidateRegistration registration(known, question);
+  EXPECT_FALSE(registration.log_odds_elsewhere(FrameId{2}, truth(2))->has_value()) << "it is right after all";
+  const auto right = registration.log_odds_elsewhere(FrameId{2}, truth(2) * planar_pose(20, 0, 0));
+  const auto wrong = registration.log_odds_elsewhere(FrameId{90}, planar_pose(40, 0, 0));
+  ASSERT_TRUE(right && *right && wrong && *wrong);
+  EXPECT_LT(**wrong, **right - 5.0);
+  EXPECT_FALSE(registration.log_odds_elsewhere(FrameId{55}, truth(2))) << "it cannot be read";
+  parameters_.geometric.min_overlap = 1.1;
+  EXPECT_EQ(*registration.log_odds_elsewhere(FrameId{90}, planar_pose(40, 0, 0)), LookAlikes::kNotRegistered);
+}
+
+TEST_F(CandidateRegistrationTest, APlaceThatLooksTheSameTurnedIsRefusedForItsHeading) {
+  const TrajectoryPoint turned = points_.at(FrameId{2})->after(planar_pose(0.3, 0.4, 2.1 + 1.5));
+  const Hypothesis found = tested({2}, turned).front();
+  ASSERT_TRUE(found.geometric && found.refusal);
+  EXPECT_EQ(found.refusal->reason, Refusal::Reason::kOtherHeading) << "86 degrees off in a metre";
+}
+
+}  // namespace
+}  // namespace revisit
