@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/store/map_store.hpp>
 
+#include <cmath>
 #include <csignal>
 #include <fstream>
 #include <optional>
@@ -77,6 +78,132 @@ TEST(MapStore, GivesBackWhatItWasGiven) {
   EXPECT_FALSE((*answers)[1].match);
   EXPECT_EQ((*answers)[1].reason, "no place like it");
   EXPECT_EQ(*store->state(), Bytes(900, std::byte{7})) << "the last one";
+}
+
+TEST(MapStore, GivesBackWhereOnTheEarthItIs) {
+  auto store = MapStore::create_temporary();
+  ASSERT_TRUE(store && store->add(keyframe(4)));
+  const StoredFix fix{{4}, {.latitude_deg = 49.0, .longitude_deg = 8.4, .altitude_m = 115.0, .deviation_m = {1, 2, 3}}};
+  ASSERT_TRUE(store->add(fix));
+  const StoredEarth earth{1, -90.0, 180.0, -3.0, some_pose(2.0)};
+  ASSERT_TRUE(store->set_earth({&earth, 1}) && store->set_earth({&earth, 1}));
+  const auto fixes = store->fixes();
+  ASSERT_TRUE(fixes) << fixes.error().message;
+  ASSERT_EQ(fixes->size(), 1u);
+  EXPECT_EQ((*fixes)[0].fix.longitude_deg, 8.4);
+  EXPECT_EQ((*fixes)[0].fix.stamp_s, keyframe(4).stamp_s) << "the key frame's";
+  EXPECT_EQ((*fixes)[0].fix.deviation_m, Eigen::Vector3d(1, 2, 3));
+  const auto back = store->earth();
+  ASSERT_TRUE(back) << back.error().message;
+  ASSERT_EQ(back->size(), 1u) << "those of before are forgotten";
+  EXPECT_EQ((*back)[0].altitude_m, -3.0);
+  EXPECT_TRUE((*back)[0].T_earth_map.isApprox(some_pose(2.0), 1e-12));
+}
+
+TEST(MapStore, PlacesOnNoEarthAreDamage) {
+  const auto refuses = [](auto change) {
+    StoredFix fix{{4}, {.latitude_deg = 49.0, .longitude_deg = 8.4, .altitude_m = 115.0, .deviation_m = {1, 2, 3}}};
+    StoredEarth earth{1, 49.0, 8.4, 115.0, Pose::Identity()};
+    StoredUp up{{4}};
+    change(fix, earth, up);
+    auto store = MapStore::create_temporary();
+    EXPECT_TRUE(store->add(keyframe(4)) && store->add(fix) && store->set_earth({&earth, 1}) && store->add(up));
+    return !store->fixes() + 2 * !store->earth() + 4 * !store->ups();
+  };
+  EXPECT_EQ(refuses([](auto&, auto&, auto&) {}), 0);
+  EXPECT_EQ(refuses([](auto& fix, auto& earth, auto&) { fix.fix.latitude_deg = earth.latitude_deg = 90.5; }), 3);
+  EXPECT_EQ(refuses([](auto& fix, auto& earth, auto&) { fix.fix.longitude_deg = earth.longitude_deg = -181.0; }), 3);
+  EXPECT_EQ(refuses([](auto& fix, auto& earth, auto&) { fix.fix.altitude_m = earth.altitude_m = INFINITY; }), 3);
+  EXPECT_EQ(refuses([](auto& fix, auto&, auto&) { fix.fix.deviation_m.y() = 0.0; }), 1);
+  EXPECT_EQ(refuses([](auto& fix, auto&, auto&) { fix.fix.deviation_m.y() = INFINITY; }), 1);
+  EXPECT_EQ(refuses([](auto&, auto& earth, auto&) { earth.T_earth_map.translation().x() = 1e8; }), 2);
+  EXPECT_EQ(refuses([](auto&, auto&, auto& up) { up.up *= 1.1; }), 4);
+}
+
+TEST(MapStore, MatricesAndPosesThatCannotBeAreDamage) {
+  auto store = MapStore::create_temporary();
+  StoredEdge edge{{4}, {9}, some_pose(4.0), 2.0 * Matrix6::Identity(), {}};
+  edge.information(0, 1) = 1.0;
+  ASSERT_TRUE(store && store->add(edge));
+  const auto edges = store->edges();
+  ASSERT_FALSE(edges) << "not symmetric";
+  EXPECT_NE(edges.error().message.find("row 1 of its edges is damaged"), std::string::npos) << edges.error().message;
+  StoredKeyframe far = keyframe(4);
+  far.T_odom_lidar.translation().z() = -1e7;
+  ASSERT_TRUE(store->add(far));
+  EXPECT_FALSE(store->keyframes());
+}
+
+TEST(MapStore, TheIndexOfAFinishedMapGoesWithAnyChange) {
+  const auto finished = [] {
+    auto store = *MapStore::create_temporary();
+    const StoredMapPose pose{{4}, some_pose(1.0), 2};
+    EXPECT_TRUE(store.add(keyframe(4)) && store.add_index(0, Bytes(10, std::byte{1})) &&
+                store.add_index(10, Bytes(5, std::byte{2})) && store.set_place_poses({&pose, 1}));
+    return store;
+  };
+  const MapStore store = finished();
+  EXPECT_EQ(*store.index_size(), 15u);
+  Bytes piece(5);
+  ASSERT_TRUE(store.read_index(10, piece));
+  EXPECT_EQ(piece, Bytes(5, std::byte{2}));
+  EXPECT_FALSE(store.read_index(9, piece)) << "no piece begins there";
+  EXPECT_FALSE(store.read_index(0, piece)) << "that one is longer";
+  ASSERT_EQ(store.place_poses()->size(), 1u);
+  EXPECT_EQ(store.place_poses()->at(0).part, 2);
+  EXPECT_TRUE(store.place_poses()->at(0).T_map_lidar.isApprox(some_pose(1.0), 1e-12));
+  for (const int change : {0, 1, 2}) {
+    MapStore changed = finished();
+    const FrameId frame{4};
+    ASSERT_TRUE(change == 0   ? changed.add(keyframe(5))
+                : change == 1 ? changed.set_map_poses({})
+                              : changed.remove({&frame, 1}, {}));
+    EXPECT_EQ(*changed.index_size(), 0u) << change;
+    EXPECT_TRUE(changed.place_poses()->empty());
+    EXPECT_FALSE(changed.read_index(0, piece));
+  }
+}
+
+TEST(MapStore, AKeyFrameIsTakenOutWithAllThatBelongsToIt) {
+  auto store = MapStore::create_temporary();
+  ASSERT_TRUE(store);
+  for (const int frame : {4, 9, 14}) {
+    ASSERT_TRUE(store->add(keyframe(frame)));
+    ASSERT_TRUE(store->add(StoredScan{{frame + 1}, {frame}, 0.5, some_pose(2.0), some_pose(3.0), true}));
+    ASSERT_TRUE(store->add(StoredUp{{frame}}));
+    ASSERT_TRUE(store->add_visit({frame}, Bytes(3)));
+    if (frame > 4) {
+      ASSERT_TRUE(store->add(StoredEdge{{frame - 5}, {frame}, some_pose(1.0), Matrix6::Identity(), {}}));
+    }
+  }
+  const FrameId frame{9};
+  const MapStore::Joint joint{{{4}, {14}, some_pose(2.0), Matrix6::Identity(), {}}, true};
+  ASSERT_TRUE(store->remove({&frame, 1}, {&joint, 1}));
+  ASSERT_EQ(store->keyframes()->size(), 2u);
+  EXPECT_TRUE(store->keyframes()->at(1).starts_segment) << "as the joint says";
+  EXPECT_EQ(store->scans()->size(), 2u);
+  EXPECT_EQ(store->ups()->size(), 2u);
+  EXPECT_EQ(*store->visits(), (std::vector<FrameId>{{4}, {14}}));
+  EXPECT_EQ(*store->places(), (std::vector<FrameId>{{4}, {14}}));
+  ASSERT_EQ(store->edges()->size(), 1u);
+  EXPECT_EQ(store->edges()->at(0).from, FrameId{4});
+  EXPECT_FALSE(store->part({9}, MapStore::Part::kCloud));
+  EXPECT_FALSE(*store->has({9}));
+  EXPECT_TRUE(*store->has({14}));
+  ASSERT_TRUE(store->check()) << store->check().error().message;
+  ASSERT_TRUE(store->forget_visits());
+  EXPECT_TRUE(store->visits()->empty());
+}
+
+TEST(MapStore, WhatIsRolledBackWasNever) {
+  auto store = MapStore::create_temporary();
+  ASSERT_TRUE(store && store->add(keyframe(1)));
+  EXPECT_TRUE(store->is_held()) << "something waits";
+  ASSERT_TRUE(store->commit());
+  EXPECT_FALSE(store->is_held());
+  ASSERT_TRUE(store->add(keyframe(2)) && store->roll_back());
+  EXPECT_EQ(store->keyframes()->size(), 1u);
+  EXPECT_TRUE(store->commit() && store->roll_back()) << "nothing to do";
 }
 
 // Whatever ends the program: what was committed is there, what was not is not.
