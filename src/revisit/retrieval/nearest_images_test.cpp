@@ -139,6 +139,37 @@ TEST_P(NearestImages, AreThoseOfComparingAll) {
   }
 }
 
+// So many places that threads share them, and that parts begin within a chunk of the store.
+TEST(LargeStore, IsSearchedInPartsThatLeaveNothingOut) {
+  const Grid grid{4, 12};
+  Places places(grid, 11);
+  PlaceStore store;
+  std::vector<IntensityScanContext> some;
+  for (int i = 0; i < 500; ++i) some.push_back(places.as_scans_are());
+  constexpr std::size_t kPlaces = 25'301;
+  for (std::size_t i = 0; i < kPlaces; ++i)
+    store.add(FrameId{static_cast<std::int64_t>(i)}, 0.1 * static_cast<double>(i), some[i * i % some.size()]);
+  for (int i = 0; i < 4; ++i) {
+    const IntensityScanContext query = places.again(some[static_cast<std::size_t>(100 * i)], 0.05);
+    const std::vector<NearImage> all = compare_all(store, query);
+    for (const std::size_t among : {kPlaces, std::size_t{16'400}, std::size_t{24'641}})
+      for (const std::size_t count : {1u, 40u, 3000u})
+        for (const int threads : {1, 2, 3, 8})
+          expect_same(*nearest_images(store, among, query.occupancy.data(), count, UINT32_MAX, threads),
+                      nearest_of(all, among, count, UINT32_MAX));
+  }
+}
+
+TEST(LargeStore, NothingIsFoundWhereNothingIsAskedFor) {
+  Places places({4, 12}, 11);
+  const IntensityScanContext query = places.as_scans_are();
+  PlaceStore store;
+  store.add(FrameId{0}, 0.0, query);
+  EXPECT_TRUE(nearest_images(store, 0, query.occupancy.data(), 5, UINT32_MAX)->empty());
+  EXPECT_TRUE(nearest_images(store, 1, query.occupancy.data(), 0, UINT32_MAX)->empty());
+  EXPECT_EQ(nearest_images(store, 1, query.occupancy.data(), 5, UINT32_MAX)->size(), 1u);
+}
+
 INSTANTIATE_TEST_SUITE_P(Grids, NearestImages, testing::Values(Grid{60, 20}, Grid{20, 60}, Grid{3, 5}, Grid{64, 64}),
                          [](const auto& grid) {
                            return std::to_string(grid.param.rings) + "x" + std::to_string(grid.param.sectors);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -167,6 +168,31 @@ TEST_F(PlaceFile, AnAlteredImageIsNoticedByTheSearchThatMeetsIt) {
   EXPECT_NE(found.error().message.find("other.places: places 0 to 4095"), std::string::npos) << found.error().message;
   EXPECT_FALSE(index->find(FrameId{0}));
   EXPECT_FALSE(index->save(path)) << "what is damaged is not saved as sound";
+}
+
+// Numbers of the header as they lie in the file (docs/formats.md).
+TEST_F(PlaceFile, AHeaderThatCannotBeIsRefused) {
+  for (const int places : {1, 300}) {
+    ASSERT_TRUE(filled(places).save(path));
+    const std::string good = bytes(path);
+    const auto error_with = [&](std::size_t at, std::uint64_t value, std::size_t size) {
+      std::string other = good;
+      std::memcpy(other.data() + at, &value, size);
+      return error_of(written(other));
+    };
+    constexpr std::size_t kRings = 16, kSectors = 20, kLevels = 24, kPlaces = 32;
+    for (const auto& [at, value] :
+         {std::pair{kRings, 0u}, {kSectors, 0u}, {kRings, 513u}, {kSectors, 721u}, {kLevels, 9u}})
+      EXPECT_NE(error_with(at, value, 4).find("; allowed: 1 to 512 rings"), std::string::npos) << at << " " << value;
+    for (const auto& [at, value] : {std::pair{kRings, 512u}, {kSectors, 720u}, {kLevels, 8u}})
+      EXPECT_NE(error_with(at, value, 4).find(" bytes instead of the "), std::string::npos) << at << " " << value;
+    EXPECT_NE(error_with(kPlaces, std::uint64_t{1} << 40, 8).find("names 1099511627776 places"), std::string::npos);
+    EXPECT_NE(error_with(kPlaces, static_cast<std::uint64_t>(places) + 1, 8).find("checksum"), std::string::npos)
+        << "as many chunks";
+    EXPECT_NE(error_with(8, 0x04030201, 4).find("other byte order"), std::string::npos);
+  }
+  ASSERT_TRUE(filled(0).save(path));
+  EXPECT_EQ(error_of(path), "") << "an empty one has no grid";
 }
 
 TEST_F(PlaceFile, ErrorsSayWhatWasAllowed) {
