@@ -10,7 +10,6 @@ namespace revisit::retrieval_internal {
 
 ChunkLayout::ChunkLayout(int rings, int sectors, int levels)
     : cells(static_cast<std::size_t>(rings) * static_cast<std::size_t>(sectors)),
-      words(revisit_bits_words(static_cast<std::uint32_t>(cells) * static_cast<std::uint32_t>(std::max(1, levels)))),
       place(revisit_bits_place_bytes(static_cast<std::uint32_t>(rings * std::max(1, levels)),
                                      static_cast<std::uint32_t>(sectors))) {
   constexpr std::size_t kBytesOfBounds =

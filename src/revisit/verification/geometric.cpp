@@ -80,6 +80,7 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
   all.rmse_m = agreement.rmse_m;
   all.voxel_m = scale.voxel_m;
   all.in_the_open = scale.in_the_open;
+  all.one_in_a_room = match.is_in_the_open() != query.is_in_the_open();
   all.least_fixed = agreement.least_fixed;
   all.inliers = agreement.inliers;
   all.stddev_m = largest_stddev_m(icp.information);

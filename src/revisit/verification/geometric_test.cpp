@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <revisit/registration/agreement.hpp>
 #include <revisit/verification/acceptance.hpp>
 
 #include "synthetic_world.hpp"
@@ -42,6 +43,50 @@ TEST(GeometricConsistency, InliersCountAsAShareOfTheTypicalOnes) {
   EXPECT_NEAR(field.evidence.inlier_share, shelves.evidence.inlier_share / 0.85, 1e-9);
   EXPECT_GT(shelves.evidence.inlier_share, shelves.evidence.inlier_ratio) << "what is hidden does not count";
   EXPECT_GT(field.log_odds, shelves.log_odds + 1.0);
+}
+
+TEST(GeometricConsistency, IntensitiesCountAsAShareOfTheTypicalOnes) {
+  const ScanGeometry match = scan_at(31, SyntheticWorld::at(0, 0, 0)), query = scan_at(31, SyntheticWorld::at(2, 1, 0));
+  const auto agreement = [&](double typical) {
+    return check_geometric(match, query, {planar_pose(2, 1, 0), 0.8, {.intensity_correlation = typical}}, {})
+        .evidence.intensity_agreement.value();
+  };
+  EXPECT_NEAR(agreement(0.5), 2.0 * agreement(1.0), 1e-9);
+}
+
+// One sensor looks farther down than the other, or sees a sector alone.
+TEST(GeometricConsistency, KnowsWhatTwoSensorsSeeOfAPlace) {
+  const Pose T_match = SyntheticWorld::at(0, 0, 0), T_query = SyntheticWorld::at(2, 1, 0.1);
+  const auto seen = [](const Pose& T, double lowest_deg, double highest_deg, double half_width_deg) {
+    Scan scan = SyntheticWorld(31).scan(T, {32, 900, lowest_deg, highest_deg});
+    std::erase_if(scan.points,
+                  [&](const Point& p) { return std::abs(std::atan2(p.y, p.x)) > to_radians(half_width_deg); });
+    return ScanGeometry(thin(scan.points, {}, 1.0));
+  };
+  const auto evidence = [&](const ScanGeometry& match, const ScanGeometry& query) {
+    return check_geometric(match, query, {T_match.inverse() * T_query}, {});
+  };
+  const auto in_sight = [](const ScanGeometry& match, const ScanGeometry& query, const GeometricEvidence& found) {
+    return measure_agreement(match.surface(), query.surface(), found.T_match_query,
+                             PairScale(match.surface(), query.surface()).inlier_distance_m())
+        .in_sight_ratio;
+  };
+  const ScanGeometry match = seen(T_match, -24.8, 5.0, 180.0), same = seen(T_query, -24.8, 5.0, 180.0);
+  const ScanGeometry flatter = seen(T_query, -15.0, 5.0, 180.0), higher = seen(T_query, -20.0, 20.0, 180.0);
+  const double typical = TypicalAgreement{}.in_sight_ratio;
+  const GeometricEvidence alike = evidence(match, same), differing = evidence(match, flatter);
+  EXPECT_FALSE(alike.evidence.sensors_differ);
+  EXPECT_NEAR(alike.evidence.inlier_share, in_sight(match, same, alike) / typical, 1e-9);
+  EXPECT_TRUE(differing.evidence.sensors_differ);
+  EXPECT_NEAR(differing.evidence.inlier_share, in_sight(match, flatter, differing) / (typical * 0.8), 1e-9);
+  EXPECT_TRUE(evidence(match, higher).evidence.sensors_differ) << "down a little less, and up much farther";
+
+  const ScanGeometry sector = seen(T_query, -24.8, 5.0, 35.0), other_sector = seen(T_match, -24.8, 5.0, 35.0);
+  EXPECT_FALSE(alike.evidence.one_is_narrow || alike.evidence.both_are_narrow);
+  EXPECT_TRUE(evidence(match, sector).evidence.one_is_narrow);
+  EXPECT_FALSE(evidence(match, sector).evidence.both_are_narrow);
+  EXPECT_FALSE(evidence(other_sector, sector).evidence.one_is_narrow);
+  EXPECT_TRUE(evidence(other_sector, sector).evidence.both_are_narrow);
 }
 
 TEST(GeometricConsistency, FeaturesSaveAWrongYaw) {

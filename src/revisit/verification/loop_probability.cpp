@@ -50,16 +50,21 @@ double log_odds_by(const Coefficients& c, const LoopEvidence& evidence) {
                           kEnoughInliers);
 }
 
-}  // namespace
-
-double loop_log_odds(const LoopEvidence& evidence) {
-  const Model& model = evidence.in_the_open ? kInTheOpen : kInRooms;
+double log_odds_by(const Model& model, const LoopEvidence& evidence) {
   if (!evidence.intensity_agreement) return log_odds_by(model.without, evidence);
   const double with = log_odds_by(model.with_intensity, evidence);
   if (!evidence.sensors_differ) return with;
   // Intensities of two sensors are comparable or not, as likely one as the other: the mean of both odds.
   const double without = log_odds_by(model.without, evidence), more = std::max(with, without);
   return more + std::log(0.5 * (std::exp(with - more) + std::exp(without - more)));
+}
+
+}  // namespace
+
+// A scan of a room and one of the open see little of each other: the more cautious of both judgements counts.
+double loop_log_odds(const LoopEvidence& evidence) {
+  const double log_odds = log_odds_by(evidence.in_the_open ? kInTheOpen : kInRooms, evidence);
+  return evidence.one_in_a_room ? std::min(log_odds, log_odds_by(kInRooms, evidence)) : log_odds;
 }
 
 double probability_of(double log_odds) { return 1.0 / (1.0 + std::exp(-log_odds)); }

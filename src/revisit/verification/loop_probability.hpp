@@ -16,12 +16,13 @@ struct LoopEvidence {
   double free_space_agreement = 0.0;  ///< smaller of both directions
   /// Correlation of intensities, as a share of that between consecutive scans; none where intensities say nothing.
   std::optional<double> intensity_agreement;
-  double rmse_m = 0.0;       ///< point-to-plane, over the inliers
-  double voxel_m = 1.0;      ///< edge of the voxels that the scans were thinned with: what lengths are measured against
-  bool in_the_open = true;   ///< SurfaceCloud::is_in_the_open() of either; rooms resemble one another more
-  double overlap = 0.0;      ///< of both scans seen from overhead
-  double least_fixed = 0.0;  ///< how well the surfaces fix the direction that they fix least (Agreement): a slide
-  std::size_t inliers = 0;   ///< points, smaller of both directions
+  double rmse_m = 0.0;      ///< point-to-plane, over the inliers
+  double voxel_m = 1.0;     ///< edge of the voxels that the scans were thinned with: what lengths are measured against
+  bool in_the_open = true;  ///< SurfaceCloud::is_in_the_open() of either; rooms resemble one another more
+  bool one_in_a_room = false;   ///< one of the scans alone is in the open
+  double overlap = 0.0;         ///< of both scans seen from overhead
+  double least_fixed = 0.0;     ///< how well the surfaces fix the direction that they fix least (Agreement): a slide
+  std::size_t inliers = 0;      ///< points, smaller of both directions
   bool sensors_differ = false;  ///< in what they can see; what their intensities have in common is not known then
   bool one_is_narrow = false;   ///< one of them sees all round, the other one a sector: the rest can contradict nothing
   bool both_are_narrow = false;  ///< both see less than half of what is around

@@ -117,6 +117,22 @@ TEST(LoopProbability, WhatIsHiddenCountsInRooms) {
   EXPECT_EQ(log_odds(true, 0.3), log_odds(true, 0.05));
 }
 
+// A room with a glass front is in the open, its neighbour is not: they see little of each other.
+TEST(LoopProbability, OfARoomAndTheOpenTheMoreCautiousJudgementCounts) {
+  LoopEvidence evidence = usual_revisit();
+  evidence.hidden_share = 0.6;
+  const double in_the_open = loop_log_odds(evidence);
+  evidence.one_in_a_room = true;
+  const double both = loop_log_odds(evidence);
+  EXPECT_LT(both, in_the_open - 5.0);
+  evidence.in_the_open = evidence.one_in_a_room = false;
+  EXPECT_DOUBLE_EQ(both, loop_log_odds(evidence));
+  evidence.inlier_share = 1.1, evidence.hidden_share = 0.0, evidence.rmse_m = 0.6;  // rooms mind a residual less
+  const double in_a_room = loop_log_odds(evidence);
+  evidence.in_the_open = evidence.one_in_a_room = true;
+  EXPECT_LT(loop_log_odds(evidence), in_a_room - 1.0);
+}
+
 TEST(LoopProbability, WithoutIntensitiesGeometryDecides) {
   LoopEvidence evidence = usual_revisit();
   evidence.intensity_agreement.reset();

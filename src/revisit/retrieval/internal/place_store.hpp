@@ -32,7 +32,7 @@ struct ChunkLayout {
   ChunkLayout() = default;
   ChunkLayout(int rings, int sectors, int levels);
 
-  std::size_t cells = 0, words = 0;
+  std::size_t cells = 0;
   std::size_t place = 0;               ///< bytes of a revisit_bits_place
   std::size_t begin[kParts + 1] = {};  ///< bytes from the start of the chunk; the last is its size
 };
