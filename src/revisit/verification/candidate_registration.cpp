@@ -148,9 +148,25 @@ void CandidateRegistration::share_geometry(std::span<Hypothesis> hypotheses) con
 }
 
 void CandidateRegistration::register_scans(Hypothesis& hypothesis, const PosePrediction* prediction) const {
-  hypothesis.geometric =
-      check_geometric(*hypothesis.geometry, *query_geometry_,
-                      {hypothesis.T_guess_match_query, hypothesis.overlap, context_.typical}, options_);
+  const auto register_from = [&](const Pose& T_guess_match_query) {
+    return check_geometric(*hypothesis.geometry, *query_geometry_,
+                           {T_guess_match_query, hypothesis.overlap, context_.typical}, options_);
+  };
+  hypothesis.geometric = register_from(hypothesis.T_guess_match_query);
+  judge(hypothesis, prediction);
+  if (!options_.follow || !hypothesis.is_accepted()) return;
+  // From metres away registration may end beside the right pose. Where the loops before have another one, it is tried
+  // from there, too; which of them is right, the scans say.
+  const auto T_by_loops =
+      context_.following.pose_at(query_.trajectory_point, context_.places.at(hypothesis.candidate.match));
+  if (!T_by_loops || agree(*T_by_loops, hypothesis.geometric->T_match_query, 0.0)) return;
+  Hypothesis again = hypothesis;
+  again.geometric = register_from(*T_by_loops);
+  judge(again, prediction);
+  if (again.own_log_odds() > hypothesis.own_log_odds()) hypothesis = std::move(again);
+}
+
+void CandidateRegistration::judge(Hypothesis& hypothesis, const PosePrediction* prediction) const {
   const auto& place = context_.places.at(hypothesis.candidate.match);
   const Pose& found = hypothesis.geometric->T_match_query;
   double support = context_.following.support_log_odds(query_.trajectory_point, place, found);

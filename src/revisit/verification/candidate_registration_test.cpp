@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/verification/candidate_registration.hpp>
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include <revisit/verification/look_alikes.hpp>
@@ -99,6 +101,42 @@ TEST_F(CandidateRegistrationTest, OfAPredictedPlaceOnlyThePoseIsOpen) {
   EXPECT_NEAR(log_odds(truth(2), 5.0), alone + 5.0, 1e-9) << "it was sure of that pose";
   EXPECT_NEAR(log_odds(truth(2) * planar_pose(0.6, 0, 0), 5.0), alone, 1e-6) << "0.6 m off: of another one";
   EXPECT_FALSE(CandidateRegistration(known, question).test(PosePrediction{FrameId{55}, truth(2), 0.0}));
+}
+
+// A hall with a pillar every 3 m and a wall at its end: 3.2 m on, a registration that begins at the same spot ends
+// beside the pillars next to the right ones.
+TEST_F(CandidateRegistrationTest, WhereALoopBeforeHasAnotherPoseTheScansDecide) {
+  const auto hall = [](double x_m) {
+    std::vector<Point> points;
+    const auto add = [&](double x, double y, double z) {
+      points.push_back({static_cast<float>(x - x_m), static_cast<float>(y), static_cast<float>(z), 0.5f});
+    };
+    for (double z = -1.0; z <= 2.0; z += 0.2) {
+      for (double x = -15.0; x <= 15.0; x += 0.2)
+        for (const double side : {-1.0, 1.0}) add(x, side * (std::fmod(x + 15.0, 3.0) < 0.6 ? 4.0 : 5.0), z);
+      for (double y = -4.0; y <= 4.0; y += 0.2) add(15.0, y, z), add(-15.0, y, z);
+    }
+    return Described{describe(points, {}), thin_for_registration(points, {})};
+  };
+  add(70, hall(0.0), points_.at(FrameId{0}));
+  const Described query = hall(3.2);
+  const TrajectoryPoint now{.segment = 7};
+  parameters_.geometric.overhead_search = false;
+  parameters_.geometric.min_probability = 0.0;
+  const auto found_x_m = [&](std::optional<double> by_loop_m) {
+    following_ = {};
+    if (by_loop_m) following_.add(now, FrameId{70}, *points_.at(FrameId{70}), planar_pose(*by_loop_m, 0, 0), 12.0);
+    const VerificationContext known = context();
+    const VerificationQuery question{FrameId{1000}, query.descriptor, query.cloud, nullptr, now};
+    LoopCandidate candidate;
+    candidate.match = FrameId{70};
+    const auto found = CandidateRegistration(known, question).test({&candidate, 1});
+    EXPECT_TRUE(found->front().is_accepted());
+    return found->front().geometric->T_match_query.translation().x();
+  };
+  EXPECT_NEAR(found_x_m(std::nullopt), 0.2, 0.3) << "a pillar off";
+  EXPECT_NEAR(found_x_m(3.0), 3.2, 0.05);
+  EXPECT_NEAR(found_x_m(-2.6), 0.2, 0.3) << "that loop is wrong, and fits worse still";
 }
 
 TEST_F(CandidateRegistrationTest, APlaceElsewhereIsScoredUnlessItIsThePlace) {

@@ -79,9 +79,21 @@ std::optional<PosePrediction> LoopFollowing::predict(const std::optional<Traject
       most = anchor.log_odds_after(*motion_m);
     }
   if (surest == nullptr) return std::nullopt;
-  const Pose T_match_query =
-      surest->place.T_segment_lidar.inverse() * surest->T_place_query_segment * query->T_segment_lidar;
-  return nearest_place(places, surest->match, T_match_query, newest);
+  return nearest_place(places, surest->match, surest->T_between_points(surest->place, *query), newest);
+}
+
+std::optional<Pose> LoopFollowing::pose_at(const std::optional<TrajectoryPoint>& query,
+                                           const std::optional<TrajectoryPoint>& place) const {
+  if (!query || !place) return std::nullopt;
+  std::optional<Pose> T_place_query;
+  double most = 0.0;
+  for (const Anchor& anchor : anchors_) {
+    const auto query_m = reliable_motion_m(anchor.query, *query), place_m = reliable_motion_m(anchor.place, *place);
+    if (!query_m || !place_m || anchor.log_odds_after(*query_m + *place_m) <= most) continue;
+    most = anchor.log_odds_after(*query_m + *place_m);
+    T_place_query = anchor.T_between_points(*place, *query);
+  }
+  return T_place_query;
 }
 
 double LoopFollowing::support_log_odds(const std::optional<TrajectoryPoint>& query,
@@ -91,8 +103,8 @@ double LoopFollowing::support_log_odds(const std::optional<TrajectoryPoint>& que
   for (const Anchor& anchor : anchors_) {
     const auto query_m = reliable_motion_m(anchor.query, *query), place_m = reliable_motion_m(anchor.place, *place);
     if (!query_m || !place_m) continue;
-    const Pose T_predicted = place->T_segment_lidar.inverse() * anchor.T_place_query_segment * query->T_segment_lidar;
-    if (agree(T_predicted, T_match_query, *query_m + *place_m)) most = std::max(most, anchor.log_odds_after(*query_m));
+    if (agree(anchor.T_between_points(*place, *query), T_match_query, *query_m + *place_m))
+      most = std::max(most, anchor.log_odds_after(*query_m));
   }
   return most;
 }

@@ -46,6 +46,9 @@ class LoopFollowing {
   /// newer than `newest`.
   std::optional<PosePrediction> predict(const std::optional<TrajectoryPoint>& query, const TrajectoryPoints& places,
                                         FrameId newest) const;
+  /// Where the surest loop of the last metres has the query, as seen from this place.
+  std::optional<Pose> pose_at(const std::optional<TrajectoryPoint>& query,
+                              const std::optional<TrajectoryPoint>& place) const;
   /// The log odds that loops of the last metres add to this pose; 0 where none of them agrees with it.
   double support_log_odds(const std::optional<TrajectoryPoint>& query, const std::optional<TrajectoryPoint>& place,
                           const Pose& T_match_query) const;
@@ -59,6 +62,9 @@ class LoopFollowing {
     double log_odds = 0.0;
     void archive(auto& fields) { fields(query, place, match, T_place_query_segment, log_odds); }
     double log_odds_after(double motion_m) const;
+    Pose T_between_points(const TrajectoryPoint& a_place, const TrajectoryPoint& a_query) const {
+      return a_place.T_segment_lidar.inverse() * T_place_query_segment * a_query.T_segment_lidar;
+    }
   };
   std::deque<Anchor> anchors_;
 };

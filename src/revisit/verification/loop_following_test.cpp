@@ -64,6 +64,21 @@ TEST(LoopFollowing, CarriesLessTheFartherItIsAndNeverMoreThanTheMost) {
   EXPECT_DOUBLE_EQ(LoopFollowing::carried(3.0, 40.0), 0.0) << "it never speaks against a pose";
 }
 
+TEST(LoopFollowing, SaysWhereTheQueryIsSeenFromAnyPlaceInReach) {
+  const TwoRounds drive;
+  LoopFollowing following;
+  const auto& query = drive.again[12];
+  EXPECT_FALSE(following.pose_at(query, drive.places.at(FrameId{20}))) << "no loop yet";
+  following.add(drive.again[10], FrameId{10}, *drive.places.at(FrameId{10}), planar_pose(0, 0.4, 0), kSure);
+  following.add(drive.again[11], FrameId{11}, *drive.places.at(FrameId{11}), planar_pose(0, 0.9, 0), 2.0);
+  const auto seen = following.pose_at(query, drive.places.at(FrameId{20}));
+  ASSERT_TRUE(seen);
+  EXPECT_TRUE(seen->isApprox(planar_pose(-8, 0.4, 0), 1e-9)) << "by the surer loop";
+  EXPECT_FALSE(following.pose_at(query, drive.places.at(FrameId{45}))) << "35 m from the places of both";
+  EXPECT_FALSE(following.pose_at(std::nullopt, drive.places.at(FrameId{20})));
+  EXPECT_FALSE(following.pose_at(query, std::nullopt));
+}
+
 TEST(LoopFollowing, PosesAgreeMoreLooselyTheFartherTheMotion) {
   const auto agrees = [](double off_m, double off_rad, double motion_m) {
     return agree(Pose::Identity(), planar_pose(off_m, 0, off_rad), motion_m);
