@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
+#include <revisit/store/internal/database.hpp>
 #include <revisit/store/stored_map.hpp>
 
 #include "shared_data.hpp"
@@ -132,6 +133,26 @@ TEST(MapSchema, AMapOfALaterVersionIsRefusedAndLeftAsItIs) {
   ASSERT_FALSE(store);
   EXPECT_NE(store.error().message.find("version 99"), std::string::npos) << store.error().message;
   run_sql(file, "SELECT descriptor FROM keyframes");
+}
+
+// Maps of before carry these sums.
+TEST(MapSchema, ASumStaysWhatItWas) {
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open(":memory:", &database), SQLITE_OK);
+  ASSERT_TRUE(store_internal::add_checksum_function(database, "a map"));
+  const auto sum_of = [&](const char* arguments) {
+    store_internal::Statement statement(database, "a map", ("SELECT checksum(" + std::string(arguments) + ")").c_str());
+    EXPECT_TRUE(statement.step()) << arguments;
+    return statement.integer(0);
+  };
+  EXPECT_EQ(sum_of("7"), 6828285977912635141);
+  EXPECT_EQ(sum_of("0.25"), -2927792052633346100);
+  EXPECT_EQ(sum_of("'a text', x'0102', NULL, 7, 0.25"), -1844972708476890687);
+  EXPECT_EQ(sum_of("-0.0"), sum_of("0.0")) << "as SQLite gives it back";
+  EXPECT_NE(sum_of("7"), sum_of("7.0"));
+  EXPECT_NE(sum_of("x''"), sum_of("NULL"));
+  EXPECT_NE(sum_of("'ab', 'c'"), sum_of("'a', 'bc'"));
+  sqlite3_close(database);
 }
 
 // Bytes that somebody else changed in any row are found.
