@@ -2,22 +2,16 @@
 #include <chrono>
 #include <iostream>
 #include <memory>
-#include <optional>
 #include <thread>
-#include <tuple>
+#include <utility>
 #include <vector>
 
 #include <revisit/core/stopwatch.hpp>
-#include <revisit/core/text.hpp>
-#include <revisit/io/nmea_file.hpp>
-#include <revisit/io/pose_file.hpp>
-#include <revisit/io/result_files.hpp>
 #include <revisit/pipeline/recording_scale.hpp>
-#include <revisit/pipeline/slam.hpp>
 #include <revisit/preprocess/undistort.hpp>
 
-#include "common.hpp"
-#include "pictures/map_picture.hpp"
+#include "commands/slam_inputs.hpp"
+#include "commands/slam_results.hpp"
 #include "progress.hpp"
 #include "read_ahead.hpp"
 #include "reports/evidence_file.hpp"
@@ -28,127 +22,6 @@ namespace revisit::cli {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct SlamOptions {
-  std::string input, out, into, poses, calibration, odometry, wheels;
-  std::optional<std::string> gps;
-  double sweep_s = 0.0;
-  bool overwrite = false, resume = false, without_map = false, is_viewed = false;
-  double checkpoint_s = SlamSetup().checkpoint_every_s;
-  InputFlags recording;
-  ParameterFlags parameters;
-};
-
-// The pose that stands in for, or helps, the tracking of scan `index`, if there is one.
-using OtherOdometry = std::function<std::optional<Pose>(std::size_t index)>;
-
-Result<OtherOdometry> other_odometry(const SlamOptions& options, const Recording& recording) {
-  const std::string& file = options.odometry.empty() ? options.wheels : options.odometry;
-  if (file == "none") return OtherOdometry([](std::size_t) { return std::nullopt; });
-  if (file == "wheels" && !recording.has_wheel_odometry()) return Error{options.input + ": has no wheel odometry"};
-  if (file.empty() || file == "wheels")
-    return OtherOdometry([&recording](std::size_t index) { return recording.wheel_pose(index); });
-  const auto poses = read_poses(file);
-  if (!poses) return poses.error();
-  auto trajectory = to_trajectory(*poses, recording.T_camera_lidar(), stamps_of(recording));
-  if (trajectory.empty()) return Error{file + ": no pose belongs to a frame of the recording"};
-  return OtherOdometry([&recording, poses_of = std::move(trajectory)](std::size_t index) {
-    return poses_of.at(recording.frame(index));
-  });
-}
-
-// Of an NMEA log, or of the recording's own receiver.
-Result<std::vector<GpsFix>> gps_fixes(const SlamOptions& options, const Recording& recording) {
-  if (!options.gps) return std::vector<GpsFix>();
-  std::error_code failure;
-  const bool is_file = fs::is_regular_file(*options.gps, failure);
-  auto fixes = is_file ? read_nmea(*options.gps) : recording.gps_fixes(*options.gps);
-  if (!fixes) return fixes.error();
-  const std::string what = is_file ? *options.gps : options.input;
-  if (fixes->empty()) return Error{what + ": holds no GPS fix; name an NMEA log, or a topic of NavSatFix"};
-  const double first_s = recording.stamp_s(0), last_s = recording.stamp_s(recording.size() - 1);
-  if (fixes->back().stamp_s < first_s || fixes->front().stamp_s > last_s)
-    return Error{what +
-                 format(": its fixes are of %.1f to %.1f s, the scans of %.1f to %.1f s", fixes->front().stamp_s,
-                        fixes->back().stamp_s, first_s, last_s) +
-                 ": one of the clocks must be set to the other"};
-  return fixes;
-}
-
-// Of --into: a session that was killed before its first checkpoint left nothing to go on with.
-Result<bool> begins_session(const MapStore& store, const SlamOptions& options, const std::string& recording) {
-  if (options.into.empty() || !options.resume) return !options.into.empty();
-  const auto sessions = store.sessions();
-  if (!sessions) return sessions.error();
-  return sessions->empty() || sessions->back().recording != recording;
-}
-
-// A session is not continued with another recording.
-Status check_session(const MapStore& store, const std::string& recording, const std::string& parameters) {
-  const auto sessions = store.sessions();
-  if (!sessions) return sessions.error();
-  if (sessions->empty()) return ok();
-  const StoredSession& last = sessions->back();
-  for (const auto& [what, was, is] :
-       {std::tuple{"the recording", &last.recording, &recording}, {"the parameters", &last.parameters, &parameters}})
-    if (*was != *is) return Error{store.file() + ": was made with " + what + " '" + *was + "', not '" + *is + "'"};
-  return ok();
-}
-
-// What must stay as it was when the map was begun.
-std::string parameters_text(const Parameters& parameters, const SlamOptions& options) {
-  std::string text = "odometry=" + options.odometry + " wheels=" + options.wheels +
-                     " calibration=" + options.calibration + " sweep=" + std::to_string(options.sweep_s) +
-                     options.recording.text();
-  for (const ParameterInfo& info : parameter_infos())
-    if (info.name.starts_with("preprocess.") || info.name.starts_with("intensity.") ||
-        info.name.starts_with("descriptor."))
-      text += " " + info.name + "=" + get_parameter(parameters, info.name);
-  return text;
-}
-
-Result<std::shared_ptr<MapStore>> shared(Result<MapStore> store) {
-  if (!store) return store.error();
-  return std::make_shared<MapStore>(*std::move(store));
-}
-
-Result<std::shared_ptr<MapStore>> open_store(const SlamOptions& options) {
-  std::error_code failure;
-  fs::create_directories(options.out, failure);
-  if (failure) return Error{options.out + ": cannot be created: " + failure.message()};
-  if (!options.into.empty()) {
-    const fs::path map = MapStore::file_of(options.into);
-    if (!fs::exists(map, failure))
-      return Error{map.string() + ": no such map; `revisit slam` without --into makes one"};
-    return shared(MapStore::open(map));
-  }
-  const fs::path file = MapStore::file_of(options.out);
-  const bool exists = fs::exists(file, failure);
-  if (exists && options.overwrite && !options.resume) {
-    if (const Status removed = MapStore::remove_file(file); !removed) return removed.error();
-  } else if (exists && !options.resume) {
-    return Error{options.out +
-                 ": already holds a map; continue it with --resume, replace it with --overwrite, or name another "
-                 "folder"};
-  }
-  return shared(fs::exists(file, failure) ? MapStore::open(file)
-                                          : MapStore::create(fs::path(options.out) / MapStore::kFileName));
-}
-
-void count(RunFile& run, const SlamStep& step) {
-  ++run.counts["scans"];
-  run.counts["keyframes"] += step.is_keyframe;
-  run.counts["untracked"] += !step.is_tracked;
-  run.counts["segments_begun"] += step.starts_segment;
-  if (!step.is_tracked) run.untracked.push_back(step.frame.value);
-  run.counts["loops"] += step.loops_entered;
-  for (const auto& [stage, value] : {std::pair{"odometry", step.ms.odometry},
-                                     {"prepare", step.ms.prepare},
-                                     {"detect", step.ms.detect},
-                                     {"graph", step.ms.graph},
-                                     {"store", step.ms.store}})
-    run.ms_total[stage] += value;
-}
 
 Status run_all(Slam& slam, const Recording& recording, const OtherOdometry& odometry, double sweep_s,
                std::vector<EvidenceFile>& evidence, RunFile& run) {
@@ -184,71 +57,6 @@ Status run_all(Slam& slam, const Recording& recording, const OtherOdometry& odom
   return slam.finish();
 }
 
-// "3 to 7, 12": the first few runs of consecutive frames.
-std::string to_ranges(const std::vector<std::int64_t>& frames) {
-  constexpr int kMost = 8;
-  std::string text;
-  int ranges = 0;
-  for (std::size_t begin = 0, end = 0; begin < frames.size(); begin = end) {
-    for (end = begin + 1; end < frames.size() && frames[end] == frames[end - 1] + 1;) ++end;
-    if (++ranges > kMost) return text + ", ...";
-    text += (text.empty() ? "" : ", ") + std::to_string(frames[begin]);
-    if (end - begin > 1) text += " to " + std::to_string(frames[end - 1]);
-  }
-  return text;
-}
-
-// Within this session, by the frames of its recording.
-Status write_rows(const MapStore& store, int session, ResultWriter& writer) {
-  const auto answers = store.answers();
-  const auto edges = store.edges();
-  if (!answers) return answers.error();
-  if (!edges) return edges.error();
-  const auto is_own = [session](FrameId frame) { return session_of(frame) == session; };
-  for (CandidateRow row : *answers) {
-    if (!is_own(row.query) || (row.match && !is_own(*row.match))) continue;
-    row.query = in_recording(row.query);
-    if (row.match) row.match = in_recording(*row.match);
-    if (const Status status = writer.add(row); !status) return status;
-  }
-  for (const StoredEdge& edge : *edges) {
-    if (!edge.loop || !is_own(edge.from) || !is_own(edge.to)) continue;
-    LoopConstraint loop = *edge.loop;
-    loop.query = in_recording(loop.query);
-    loop.match = in_recording(loop.match);
-    if (const Status status = writer.add(loop); !status) return status;
-  }
-  return writer.finish();
-}
-
-Status write_trajectories(const Slam& slam, const Recording& recording, const fs::path& out) {
-  const auto trajectories = slam.trajectories();
-  if (!trajectories) return trajectories.error();
-  const auto T_camera_lidar = recording.T_camera_lidar();
-  if (T_camera_lidar)
-    if (const Status status = write_camera_calibration(out / "calib.txt", *T_camera_lidar); !status) return status;
-  for (const Status& status : {write_kitti_poses(out / "poses.txt", trajectories->corrected, T_camera_lidar),
-                               write_tum_poses(out / "poses.tum", trajectories->corrected),
-                               write_tum_poses(out / "odometry.tum", trajectories->odometry),
-                               slam.graph().graph().write_g2o(out / "graph.g2o")})
-    if (!status) return status;
-  return ok();
-}
-
-Status write_map(const Slam& slam, const fs::path& out, RunFile& run) {
-  Stopwatch watch;
-  Progress progress("map", "key frames", slam.graph().keyframes().size());
-  const auto report = slam.write_map(out, [&](std::size_t done) {
-    progress.update(done);
-    return true;
-  });
-  if (!report) return report.error();
-  run.counts["map_points"] = report->points;
-  run.counts["moving_points_left_out"] = report->moving;
-  run.ms_total["map"] = watch.lap_ms();
-  return draw_map(out / "map.png", out / "map.ply", slam.graph().graph().nodes());
-}
-
 // The map as it grows, in a browser, until the program ends.
 Result<std::unique_ptr<ViewServer>> look_at(const fs::path& out) {
   auto view = ResultsView::open(out);
@@ -256,6 +64,43 @@ Result<std::unique_ptr<ViewServer>> look_at(const fs::path& out) {
   auto server = ViewServer::start({*std::move(view)}, {});
   if (server) print_log()(LogLevel::kInfo, "look at it while it grows: " + (*server)->address());
   return server;
+}
+
+RunFile describe_run(const SlamOptions& options, const Parameters& parameters, const IntensityScale& scale) {
+  RunFile run;
+  run.command = "slam";
+  run.arguments = program_arguments();
+  run.input = fs::absolute(options.input).lexically_normal().string();
+  run.poses = options.odometry.empty() ? options.wheels : options.odometry;
+  run.calibration = options.calibration;
+  run.topic = options.recording.options().topic;
+  run.parameters = parameters;
+  run.intensity = scale;
+  return run;
+}
+
+// In the results, and beside the map that is added to.
+std::vector<EvidenceFile> evidence_files(const SlamOptions& options, const Slam& slam) {
+  const auto last = slam.last_frame();
+  std::vector<EvidenceFile> files;
+  files.emplace_back(fs::path(options.out) / "evidence.csv", last);
+  if (!options.into.empty()) {
+    const FrameId before{in_map(slam.session(), last.value_or(FrameId{0})).value - (last ? 0 : 1)};
+    files.push_back(EvidenceFile::of_map(MapStore::file_of(options.into), before));
+  }
+  return files;
+}
+
+// What was found is written, whatever happened.
+Status write_results(const Slam& slam, const Recording& recording, const MapStore& store, ResultWriter& writer,
+                     bool with_map, const fs::path& out, RunFile& run) {
+  const Status rows = write_rows(store, slam.session(), writer);
+  const Status poses = !slam.has_keyframes() ? ok() : write_trajectories(slam, recording, out);
+  const Status map = !slam.has_keyframes() || !with_map ? ok() : write_map(slam, out, run);
+  const Status described = write_run(out / "run.json", run);
+  for (const Status* each : {&rows, &poses, &map, &described})
+    if (!*each) return *each;
+  return ok();
 }
 
 int slam(const SlamOptions& options) {
@@ -277,33 +122,12 @@ int slam(const SlamOptions& options) {
   if (!gps) return fail(gps.error());
   if (!scale->warning.empty()) print_log()(LogLevel::kWarning, options.input + ": " + scale->warning);
 
-  RunFile run;
-  run.command = "slam";
-  run.arguments = program_arguments();
-  run.input = fs::absolute(options.input).lexically_normal().string();
-  run.poses = options.odometry.empty() ? options.wheels : options.odometry;
-  run.calibration = options.calibration;
-  run.topic = options.recording.options().topic;
-  run.parameters = *parameters;
-  run.intensity = *scale;
-
+  RunFile run = describe_run(options, *parameters, *scale);
   const auto store = open_store(options);
   if (!store) return fail(store.error());
-  const auto is_new = begins_session(**store, options, run.input);
-  if (!is_new) return fail(is_new.error());
-  SlamSetup setup{*scale,
-                  *calibration,
-                  options.odometry.empty() ? Odometry::Source::kLidar : Odometry::Source::kExternal,
-                  print_log(),
-                  *std::move(gps),
-                  *is_new,
-                  run.input,
-                  parameters_text(*parameters, options),
-                  options.checkpoint_s};
-  if (!setup.new_session)
-    if (const Status status = check_session(**store, setup.recording, setup.parameters); !status)
-      return fail(status.error());
-  auto slam = Slam::open(*store, *parameters, setup);
+  const auto setup = slam_setup(options, *parameters, *scale, *calibration, *std::move(gps), run.input, **store);
+  if (!setup) return fail(setup.error());
+  auto slam = Slam::open(*store, *parameters, *setup);
   if (!slam) return fail(slam.error());
 
   const fs::path out = options.out;
@@ -312,52 +136,27 @@ int slam(const SlamOptions& options) {
   if (!writer) return fail(writer.error());
   if (std::error_code failure; !options.resume && fs::exists(out / "tiles" / "tileset.json", failure))
     fs::remove_all(out / "tiles", failure);  // of another map
-  std::vector<EvidenceFile> evidence;
-  evidence.emplace_back(out / "evidence.csv", slam->last_frame());
-  if (!options.into.empty()) {
-    const auto last = slam->last_frame();
-    const FrameId before{in_map(slam->session(), last.value_or(FrameId{0})).value - (last ? 0 : 1)};
-    evidence.push_back(EvidenceFile::of_map(MapStore::file_of(options.into), before));
-  }
+  std::vector<EvidenceFile> evidence = evidence_files(options, *slam);
   const auto viewer = options.is_viewed ? look_at(options.into.empty() ? out : fs::path(options.into))
                                         : Result<std::unique_ptr<ViewServer>>(nullptr);
   if (!viewer) return fail(viewer.error());
   listen_for_interrupt();
   Stopwatch watch;
-  Status status = run_all(*slam, **recording, *odometry, options.sweep_s, evidence, run);
+  const Status status = run_all(*slam, **recording, *odometry, options.sweep_s, evidence, run);
   run.ms_total["all"] = watch.lap_ms();
   run.counts["skipped"] = run.skipped.size();
-  // What was found until here is written, whatever happened.
-  const Status rows = write_rows(**store, slam->session(), *writer);
-  const Status poses = !slam->has_keyframes() ? ok() : write_trajectories(*slam, **recording, out);
-  const Status map = !slam->has_keyframes() || options.without_map ? ok() : write_map(*slam, out, run);
-  const Status described = write_run(out / "run.json", run);
-  for (const Status* each : {&std::as_const(status), &rows, &poses, &map, &described})
-    if (!*each) return fail(each->error());
+  const Status written = write_results(*slam, **recording, **store, *writer, !options.without_map, out, run);
+  if (!status) return fail(status.error());
+  if (!written) return fail(written.error());
 
   if (!slam->has_keyframes()) return fail({options.input + ": no scan can be used"});
-  std::cout << run.counts["scans"] << " scans, " << slam->graph().keyframes().size() << " key frames, "
-            << run.counts["loops"] << " loops in the graph, " << run.counts["untracked"] << " scans not tracked, "
-            << run.skipped.size() << " skipped\nTrajectory: " << (out / "poses.tum").string();
-  if (!options.without_map) std::cout << "\nMap: " << (out / "map.ply").string() << ", " << (out / "map.png").string();
-  std::cout << '\n';
-  if (slam->session() > 0 && !slam->is_joined())
-    print_log()(
-        LogLevel::kWarning,
-        "this session was not found in the map: it waits beside it, with coordinates of its own, until a session "
-        "that passes through both joins them");
-  if (!run.untracked.empty())
-    print_log()(LogLevel::kWarning, "not tracked: frames " + to_ranges(run.untracked) +
-                                        "; their poses are predicted (exit code 3; all of them in run.json)");
-  if (run.interrupted) {
-    print_log()(LogLevel::kWarning, "interrupted: continue with --resume");
-    return kInterrupted;
-  }
+  tell_result(*slam, run, out, !options.without_map);
+  if (run.interrupted) return kInterrupted;
   if (*viewer) {
     std::cout << "Look at it: " << (*viewer)->address() << "   Ctrl-C ends." << std::endl;
     while (!interrupted()) std::this_thread::sleep_for(std::chrono::milliseconds(100));
   }
-  return run.skipped.empty() && run.counts["untracked"] == 0 ? kDone : kDoneWithReservations;
+  return run.skipped.empty() && run.untracked.empty() ? kDone : kDoneWithReservations;
 }
 
 }  // namespace
