@@ -137,6 +137,8 @@ TEST_F(CandidateRegistrationTest, WhereALoopBeforeHasAnotherPoseTheScansDecide) 
   EXPECT_NEAR(found_x_m(std::nullopt), 0.2, 0.3) << "a pillar off";
   EXPECT_NEAR(found_x_m(3.0), 3.2, 0.05);
   EXPECT_NEAR(found_x_m(-2.6), 0.2, 0.3) << "that loop is wrong, and fits worse still";
+  parameters_.geometric.follow = false;
+  EXPECT_NEAR(found_x_m(3.0), 0.2, 0.3) << "loops are not to count";
 }
 
 TEST_F(CandidateRegistrationTest, APlaceElsewhereIsScoredUnlessItIsThePlace) {

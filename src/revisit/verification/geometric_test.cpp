@@ -191,6 +191,18 @@ TEST(GeometricConsistency, NothingToRegister) {
   EXPECT_FALSE(check_geometric(nothing, match, {planar_pose(0, 0, 0.0)}, {}).is_consistent());
 }
 
+TEST(Decide, WhatMeetsALimitIsAccepted) {
+  GeometricEvidence found;
+  found.evidence.inlier_ratio = 0.25;
+  found.evidence.stddev_m = 0.1;
+  found.evidence.distance_m = 15.0;
+  GeometricOptions options;
+  options.min_inlier_ratio = 0.25;
+  options.min_probability = probability_of(loop_log_odds(found.evidence) + 1.0);
+  decide(found, 0.0, 1.0, options);
+  EXPECT_FALSE(found.refusal);
+}
+
 TEST(Decide, APriorDecidesWhereTheScansLeaveItOpen) {
   GeometricEvidence found;
   found.evidence = {.inlier_ratio = 0.5,

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/verification/loop_verification.hpp>
 
+#include <algorithm>
+#include <map>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -83,6 +85,7 @@ TEST_F(LoopVerificationTest, ALaterLoopLeadsBackUnlessAnotherPoseWasAsSure) {
   ASSERT_TRUE(answer && *answer);
   EXPECT_TRUE((*answer)->is_accepted());
   EXPECT_EQ((*answer)->candidate.match, FrameId{3});
+  EXPECT_EQ(verification.hypotheses().size(), 1u);
   // The same pose, found from another place, is no other; one 4 m away is.
   for (const auto& [at_m, is_accepted] : {std::pair{2.0, true}, {-2.0, false}}) {
     const RegisteredPose registered{FrameId{1}, planar_pose(at_m, 0.1, 0), (*answer)->geometric->log_odds};
@@ -90,6 +93,7 @@ TEST_F(LoopVerificationTest, ALaterLoopLeadsBackUnlessAnotherPoseWasAsSure) {
     const auto doubted = against.verify_again({&registered, 1});
     ASSERT_TRUE(doubted && *doubted);
     EXPECT_EQ((*doubted)->is_accepted(), is_accepted) << at_m;
+    EXPECT_EQ(against.hypotheses().size(), 1u) << "what was registered then is not tested again";
   }
   const VerificationQuery lost{FrameId{1001}, query.descriptor, query.cloud, nullptr, TrajectoryPoint{.segment = 8}};
   LoopVerification out_of_reach(known, lost);
@@ -149,6 +153,30 @@ TEST_F(LoopVerificationTest, WhatStandsOutFromLookAlikesNeedsLessCautionInAMap) 
   EXPECT_NEAR(own_log_odds(2.0, std::nullopt), usual + 2.0, 1e-9) << "nothing is alike: no caution to take away";
   EXPECT_NEAR(own_log_odds(-2.0, std::nullopt), usual - 0.4, 1e-9) << "nothing else fits: a fifth of it is left";
   EXPECT_NEAR(own_log_odds(-2.0, TrajectoryPoint{.segment = 9}), usual - 2.0, 1e-9) << "on a drive all of it";
+}
+
+TEST_F(LoopVerificationTest, TheLessAPoseStandsOutTheMoreCautionIsLeft) {
+  add(80, described(home_, SyntheticWorld::at(5.0, 0.6, 0)), points_.at(FrameId{0})->after(planar_pose(40, 0, 0)));
+  const Described query = described(home_, SyntheticWorld::at(2.2, 0.3, 0.0));
+  const auto own_log_odds = [&](double look_alikes) {
+    VerificationContext known = context();
+    known.look_alikes_log_odds = look_alikes;
+    const VerificationQuery question{FrameId{1000}, query.descriptor, query.cloud, nullptr, std::nullopt};
+    LoopVerification verification(known, question);
+    EXPECT_TRUE(verification.verify(candidates(query, {2, 80})));
+    std::map<FrameId, double> most;
+    for (const Hypothesis& each : verification.hypotheses())
+      if (each.geometric)
+        most[each.candidate.match] =
+            std::max(most.try_emplace(each.candidate.match, -1e9).first->second, each.own_log_odds());
+    return most;
+  };
+  const auto usual = own_log_odds(0.0), cautious = own_log_odds(-2.0);
+  const double ahead = usual.at(FrameId{2}) - usual.at(FrameId{80});
+  ASSERT_GT(ahead, 0.5);
+  ASSERT_LT(ahead, 7.5);
+  EXPECT_NEAR(cautious.at(FrameId{2}), usual.at(FrameId{2}) - 2.0 * (1.0 - 0.8 * ahead / 8.0), 1e-6);
+  EXPECT_NEAR(cautious.at(FrameId{80}), usual.at(FrameId{80}) - 2.0, 1e-6) << "it stands behind";
 }
 
 TEST_F(LoopVerificationTest, APlaceThatCannotBeReadIsAnError) {
