@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """How many small mistakes the tests of a module find.
 
-usage: scripts/mutants.py [MODULE...] [--each N] [--seed S]
+usage: scripts/mutants.py [MODULE...] [--each N] [--seed S] [--again OUTPUT]
 
 Puts one mistake after the other into the sources of a module (default: bits, retrieval, verification, pose_graph,
 store), builds the module's own tests in a copy of the tree (build/mutants), and runs them. A mistake is found where the
 tests fail, hang or do not compile. --each: so many a module, drawn by the seed (default 30; 0: all). Prints a table and
-those that nobody found; these are looked at by hand (docs/reliability.md).
+those that nobody found; these are looked at by hand (docs/reliability.md). --again: only those that an earlier output
+lists as not found, once there are tests for them.
 """
 
 import argparse
@@ -46,11 +47,17 @@ def mutants_of(file):
                 yield number, code[:found.start()] + instead + line[found.end():]
 
 
+def described(tree, file, number, line):
+    """As the list of what was not found names it; lines that moved since are other mistakes."""
+    return f"{file.relative_to(tree)}:{number + 1}: {file.read_text().splitlines()[number].strip()}  ->  {line.strip()}"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("modules", nargs="*", default=MODULES)
     parser.add_argument("--each", type=int, default=30)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--again", type=pathlib.Path)
     given = parser.parse_args()
     tree, build = WORK / "tree", WORK / "build"
     shutil.rmtree(tree, ignore_errors=True)
@@ -71,18 +78,21 @@ def main():
         files = [file for file in sorted((tree / "src/revisit" / module).glob("*.cpp")) if not file.stem.endswith("_test")]
         mutants = [(file, *mutant) for file in files for mutant in mutants_of(file)]
         random.Random(given.seed).shuffle(mutants)
-        mutants = mutants[:given.each or len(mutants)]
+        if given.again:
+            mutants = [mutant for mutant in mutants if described(tree, *mutant) in given.again.read_text()]
+        else:
+            mutants = mutants[:given.each or len(mutants)]
         found = 0
         for i, (file, number, line) in enumerate(mutants):
             right = file.read_text()
             lines = right.splitlines()
-            was, lines[number] = lines[number], line
+            was, lines[number] = described(tree, file, number, line), line
             file.write_text("\n".join(lines) + "\n")
             is_found = run("cmake", "--build", build, "--target", f"{module}_test") != 0 or run(build / "bin" / f"{module}_test", timeout=300) != 0
             file.write_text(right)
             found += is_found
             if not is_found:
-                missed.append(f"{file.relative_to(tree)}:{number + 1}: {was.strip()}  ->  {line.strip()}")
+                missed.append(was)
                 print(f"not found: {missed[-1]}", file=sys.stderr)
             print(f"{module}: {i + 1} of {len(mutants)}, {found} found", file=sys.stderr, flush=True)
         print(f"| {module} | {len(mutants)} | {found} | {found / max(1, len(mutants)):.0%} |", flush=True)

@@ -18,8 +18,8 @@ struct Refusal {
     kFewInliers,
     kSlides,  ///< the surfaces hardly fix the position along one direction: its standard deviation, metres
     kImprobable,
-    kOneNarrowView,  ///< by one scan of a sector, which may be that of another street
-    kTooFar,         ///< the relative translation
+    kOneView,  ///< by one scan of a sector or of a room, which may be another street's or another room's
+    kTooFar,   ///< the relative translation
   };
   Reason reason = Reason::kNoCandidate;
   double value = 0.0, limit = 0.0;  ///< what was measured, and the bound that it missed; 0 where there is none

@@ -33,8 +33,8 @@ inline std::string to_text(const Refusal& refusal) {
       return format("position uncertain by %.2f m: more than %.2f m", value, limit);
     case Reason::kImprobable:
       return format("probability %.3f below %.3f", value, limit);
-    case Reason::kOneNarrowView:
-      return "probability " + format("%.3f", value) + " by one scan of a narrow view: a drive is needed";
+    case Reason::kOneView:
+      return "probability " + format("%.3f", value) + " by one scan of a narrow view or a room: a drive is needed";
     case Reason::kTooFar:
       return format("translation %.1f m above %.1f m", value, limit);
   }

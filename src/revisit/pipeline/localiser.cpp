@@ -86,13 +86,14 @@ Localisation Localiser::found(FrameId frame, const LoopConstraint& loop) const {
   return result;
 }
 
-// A sector of a street fits elsewhere, too, where nothing can contradict it: one scan never decides.
-void Localiser::ask_for_more_of_narrow_views(Detection& detection) {
+// A sector of a street fits elsewhere, too, where nothing can contradict it: one scan never decides. One of a room does
+// where it shows more than those of other rooms do.
+void Localiser::ask_for_more_views(Detection& detection) {
   if (!detection.loop) return;
   const auto registered = std::find_if(detection.registered.begin(), detection.registered.end(),
                                        [&](const auto& each) { return each.match == detection.loop->match; });
-  if (registered == detection.registered.end() || registered->evidence.evidence.decides_alone()) return;
-  detection.refusal = Refusal{Refusal::Reason::kOneNarrowView, detection.loop->probability, 0.0};
+  if (registered == detection.registered.end() || registered->evidence.decides_alone()) return;
+  detection.refusal = Refusal{Refusal::Reason::kOneView, detection.loop->probability, 0.0};
   detection.loop.reset();
 }
 
@@ -116,7 +117,7 @@ Result<Localisation> Localiser::locate(Scan scan) {
     }
   }
   if (const Status looked = look_nearby(*prepared, *detection); !looked) return looked.error();
-  ask_for_more_of_narrow_views(*detection);
+  ask_for_more_views(*detection);
   Localisation result;
   if (detection->loop) result = found(prepared->scan.frame, *detection->loop);
   result.frame = prepared->scan.frame;

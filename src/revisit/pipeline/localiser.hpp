@@ -75,8 +75,8 @@ class Localiser {
   double expectation_log_odds(const Pose& T_map_lidar, int part, const TrajectoryPoint& point) const;
   Localisation found(FrameId frame, const LoopConstraint& loop) const;
 
-  /// Takes the loop away from one scan of a sector, which does not decide alone: the refusal says so.
-  static void ask_for_more_of_narrow_views(Detection& detection);
+  /// Takes the loop away from one scan of a sector or a room that does not decide alone: the refusal says so.
+  static void ask_for_more_views(Detection& detection);
 
   static constexpr double kFarFromPlaces_m = 20.0;  ///< from the nearest place: it has left the map
 

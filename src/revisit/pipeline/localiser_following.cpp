@@ -20,7 +20,7 @@ struct Staying {
 };
 
 struct Waking {
-  static constexpr double kNarrowView_log_odds = 2.0;  ///< what a scan counts at most that does not decide alone
+  static constexpr double kOneView_log_odds = 2.0;  ///< what a scan counts at most that does not decide alone
 };
 
 struct Expecting {
@@ -73,16 +73,16 @@ Result<Localisation> Localiser::follow(Scan scan, const std::optional<Pose>& T_e
 Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const TrajectoryPoint& point) {
   auto detection = recognition_.find(scan, places(), typical_);
   if (!detection) return detection.error();
-  ask_for_more_of_narrow_views(*detection);
+  ask_for_more_views(*detection);
   if (expected_)
     if (const Status looked = look_where_expected(scan, point, *detection); !looked) return looked.error();
   std::vector<PoseBelief::Sighting> sightings;
   for (const Detection::Registered& each : detection->registered) {
     const Pose T_map_lidar = map_.T_map_lidar(each.match) * each.evidence.T_match_query;
     const int part = map_.part(each.match);
-    const double log_odds = each.evidence.evidence.decides_alone()
+    const double log_odds = each.evidence.decides_alone()
                                 ? each.evidence.own_log_odds
-                                : std::min(each.evidence.own_log_odds, Waking::kNarrowView_log_odds);
+                                : std::min(each.evidence.own_log_odds, Waking::kOneView_log_odds);
     sightings.push_back({each.match, part, T_map_lidar, log_odds, expectation_log_odds(T_map_lidar, part, point)});
   }
   belief_.add(point, sightings);

@@ -191,6 +191,18 @@ TEST(GeometricConsistency, NothingToRegister) {
   EXPECT_FALSE(check_geometric(nothing, match, {planar_pose(0, 0, 0.0)}, {}).is_consistent());
 }
 
+TEST(Decide, OneScanOfARoomMustShowMoreToDecideAlone) {
+  GeometricEvidence found;
+  found.own_log_odds = 5.5;
+  EXPECT_TRUE(found.decides_alone()) << "in the open";
+  found.evidence.in_the_open = false;
+  EXPECT_FALSE(found.decides_alone());
+  found.own_log_odds = 6.0;
+  EXPECT_TRUE(found.decides_alone());
+  found.evidence.one_is_narrow = true;
+  EXPECT_FALSE(found.decides_alone());
+}
+
 TEST(Decide, WhatMeetsALimitIsAccepted) {
   GeometricEvidence found;
   found.evidence.inlier_ratio = 0.25;
