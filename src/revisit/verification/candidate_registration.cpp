@@ -155,8 +155,8 @@ void CandidateRegistration::register_scans(Hypothesis& hypothesis, const PosePre
   hypothesis.geometric = register_from(hypothesis.T_guess_match_query);
   judge(hypothesis, prediction);
   if (!options_.follow || !hypothesis.is_accepted()) return;
-  // From metres away registration may end beside the right pose. Where the loops before have another one, it is tried
-  // from there, too; which of them is right, the scans say.
+  // A registration that begins metres away may end beside the right pose. Where the loops before have another pose, a
+  // second one begins there; of the two poses the one that the scans fit better counts.
   const auto T_by_loops =
       context_.following.pose_at(query_.trajectory_point, context_.places.at(hypothesis.candidate.match));
   if (!T_by_loops || agree(*T_by_loops, hypothesis.geometric->T_match_query, 0.0)) return;

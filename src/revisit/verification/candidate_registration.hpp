@@ -74,6 +74,7 @@ class CandidateRegistration {
   void share_geometry(std::span<Hypothesis> hypotheses) const;
   void check_temporal_consistency(Hypothesis& hypothesis) const;
   void register_scans(Hypothesis& hypothesis, const PosePrediction* prediction = nullptr) const;
+  /// Accepts or refuses a pose that was registered, with what odometry and the loops before say of it.
   void judge(Hypothesis& hypothesis, const PosePrediction* prediction) const;
   Pose from_upright(const Hypothesis& hypothesis, const Pose& T_match_query_upright) const;
 

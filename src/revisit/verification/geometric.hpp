@@ -36,8 +36,8 @@ struct GeometricEvidence {
   std::optional<Refusal> refusal;  ///< absent where it is consistent
 
   bool is_consistent() const { return !refusal; }
-  /// One scan of a place is enough to know it. In rooms it must show more: those of another building reach log odds of
-  /// 5 (docs/maps.md).
+  /// Whether this one scan is enough to know the place. Of a room it must show more, since scans of another building
+  /// reach log odds of 5, a few of them 7 (docs/maps.md).
   bool decides_alone() const {
     constexpr double kSureInRooms = 6.0;  ///< log odds
     return evidence.decides_alone() && (evidence.in_the_open || own_log_odds >= kSureInRooms);

@@ -79,7 +79,7 @@ std::optional<PosePrediction> LoopFollowing::predict(const std::optional<Traject
       most = anchor.log_odds_after(*motion_m);
     }
   if (surest == nullptr) return std::nullopt;
-  return nearest_place(places, surest->match, surest->T_between_points(surest->place, *query), newest);
+  return nearest_place(places, surest->match, surest->T_place_query(surest->place, *query), newest);
 }
 
 std::optional<Pose> LoopFollowing::pose_at(const std::optional<TrajectoryPoint>& query,
@@ -91,7 +91,7 @@ std::optional<Pose> LoopFollowing::pose_at(const std::optional<TrajectoryPoint>&
     const auto query_m = reliable_motion_m(anchor.query, *query), place_m = reliable_motion_m(anchor.place, *place);
     if (!query_m || !place_m || anchor.log_odds_after(*query_m + *place_m) <= most) continue;
     most = anchor.log_odds_after(*query_m + *place_m);
-    T_place_query = anchor.T_between_points(*place, *query);
+    T_place_query = anchor.T_place_query(*place, *query);
   }
   return T_place_query;
 }
@@ -103,7 +103,7 @@ double LoopFollowing::support_log_odds(const std::optional<TrajectoryPoint>& que
   for (const Anchor& anchor : anchors_) {
     const auto query_m = reliable_motion_m(anchor.query, *query), place_m = reliable_motion_m(anchor.place, *place);
     if (!query_m || !place_m) continue;
-    if (agree(anchor.T_between_points(*place, *query), T_match_query, *query_m + *place_m))
+    if (agree(anchor.T_place_query(*place, *query), T_match_query, *query_m + *place_m))
       most = std::max(most, anchor.log_odds_after(*query_m));
   }
   return most;

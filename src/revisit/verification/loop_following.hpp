@@ -46,7 +46,7 @@ class LoopFollowing {
   /// newer than `newest`.
   std::optional<PosePrediction> predict(const std::optional<TrajectoryPoint>& query, const TrajectoryPoints& places,
                                         FrameId newest) const;
-  /// Where the surest loop of the last metres has the query, as seen from this place.
+  /// T_place_query as the surest loop of the last metres and odometry have it; nothing where no loop reaches both.
   std::optional<Pose> pose_at(const std::optional<TrajectoryPoint>& query,
                               const std::optional<TrajectoryPoint>& place) const;
   /// The log odds that loops of the last metres add to this pose; 0 where none of them agrees with it.
@@ -62,8 +62,9 @@ class LoopFollowing {
     double log_odds = 0.0;
     void archive(auto& fields) { fields(query, place, match, T_place_query_segment, log_odds); }
     double log_odds_after(double motion_m) const;
-    Pose T_between_points(const TrajectoryPoint& a_place, const TrajectoryPoint& a_query) const {
-      return a_place.T_segment_lidar.inverse() * T_place_query_segment * a_query.T_segment_lidar;
+    /// Of another place and query on the same two segments.
+    Pose T_place_query(const TrajectoryPoint& of_place, const TrajectoryPoint& of_query) const {
+      return of_place.T_segment_lidar.inverse() * T_place_query_segment * of_query.T_segment_lidar;
     }
   };
   std::deque<Anchor> anchors_;

@@ -19,7 +19,7 @@ struct LoopEvidence {
   double rmse_m = 0.0;      ///< point-to-plane, over the inliers
   double voxel_m = 1.0;     ///< edge of the voxels that the scans were thinned with: what lengths are measured against
   bool in_the_open = true;  ///< SurfaceCloud::is_in_the_open() of either; rooms resemble one another more
-  bool one_in_a_room = false;   ///< one of the scans alone is in the open
+  bool one_in_a_room = false;   ///< one scan is of a room, the other in the open
   double overlap = 0.0;         ///< of both scans seen from overhead
   double least_fixed = 0.0;     ///< how well the surfaces fix the direction that they fix least (Agreement): a slide
   std::size_t inliers = 0;      ///< points, smaller of both directions

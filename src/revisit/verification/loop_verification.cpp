@@ -99,7 +99,8 @@ void LoopVerification::weigh_against_each_other() {
         others = std::max(others, std::exp(log_odds[j]));
     if (others == 0.0) continue;
     GeometricEvidence& found = *hypotheses_[i].geometric;
-    const double of_recording = found.own_log_odds - loop_log_odds(found.evidence);  // as far as it does not stand out
+    // The caution for look-alikes, less what trust_what_stands_out() took away.
+    const double of_recording = found.own_log_odds - loop_log_odds(found.evidence);
     decide(found, of_recording, log_odds[i] - found.own_log_odds - std::log1p(others), context_.parameters.geometric);
     hypotheses_[i].refusal = found.refusal;
   }
