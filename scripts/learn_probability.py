@@ -16,7 +16,7 @@ import numpy as np
 
 RIGHT_M, RIGHT_DEG = 0.5, 3.0  # docs/evaluation.md
 WRONG_M, WRONG_DEG = 2.0, 10.0  # in between, the place is right and the pose poor: nothing is learnt from it
-NAMES = ["inlier_share", "free_space", "intensity", "rmse", "least_fixed", "few", "hidden"]
+NAMES = ["inlier_share", "free_space", "intensity", "rmse", "least_fixed", "few", "hidden", "residual"]
 REGULARISED = 2e-2
 
 
@@ -51,7 +51,8 @@ def load(folder):
                       float(row["rmse_m"]) / float(row.get("voxel_m") or 1.0),
                       max(0.0, float(row["least_fixed"]))**0.5,
                       np.log(np.clip(float(row["inliers"]), 10.0, 300.0) / 300.0),
-                      float(row["hidden_share"]) - 0.03 * distance_m])
+                      float(row["hidden_share"]) - 0.03 * distance_m,
+                      max(1.0, float(row["residual_share"]) / (1.0 + 0.03 * distance_m))])
             right.append(is_right)
             queries.append(int(row["query"]))
             in_the_open.append(row["in_the_open"] == "1")
@@ -99,9 +100,11 @@ def main():
         pairs = [(f.name, of_world(r, in_the_open)) for f, r in zip(folders, everything)]
         names, recordings = zip(*[(name, r) for name, r in pairs if r is not None])
         for intensity in (True, False):
-            # In the open, what came and went since the earlier visit hides as much as another place does.
+            # In the open, what came and went since the earlier visit hides as much as another place does. In rooms a
+            # residual counts as a share of the sensor's own: walls show its noise, trees do not.
+            unused = {"hidden", "residual"} if in_the_open else {"rmse"}
             columns = [i for i, name in enumerate(NAMES)
-                       if (not in_the_open or name != "hidden") and (intensity or name != "intensity")]
+                       if name not in unused and (intensity or name != "intensity")]
             slopes, constant = learn(recordings, columns)
             print("open" if in_the_open else "rooms", "with intensity" if intensity else "without",
                   {NAMES[c]: round(float(s), 3) for c, s in zip(columns, slopes)}, "constant", round(constant, 3))

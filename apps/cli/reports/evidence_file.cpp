@@ -39,9 +39,9 @@ EvidenceFile::EvidenceFile(const std::filesystem::path& csv, std::optional<Frame
   stream_.open(file_, last ? std::ios::app : std::ios::trunc);
   stream_ << std::setprecision(10);
   if (stream_.tellp() == 0)
-    stream_
-        << "query,match,inlier_ratio,inlier_share,free_space_agreement,intensity_agreement,rmse_m,overlap,"
-           "distance_m,least_fixed,voxel_m,inliers,log_odds,tx,ty,tz,qx,qy,qz,qw,hidden_share,in_the_open,stddev_m\n";
+    stream_ << "query,match,inlier_ratio,inlier_share,free_space_agreement,intensity_agreement,rmse_m,overlap,"
+               "distance_m,least_fixed,voxel_m,inliers,log_odds,tx,ty,tz,qx,qy,qz,qw,hidden_share,in_the_open,stddev_m,"
+               "residual_share\n";
 }
 
 EvidenceFile EvidenceFile::of_map(const std::filesystem::path& map_file, FrameId last) {
@@ -66,7 +66,7 @@ Status EvidenceFile::add(const Detection& detection) {
       stream_ << ',' << value;
     stream_ << ',' << e.in_the_open << ',';
     if (std::isfinite(e.stddev_m)) stream_ << e.stddev_m;
-    stream_ << '\n';
+    stream_ << ',' << e.residual_share << '\n';
   }
   stream_.flush();
   return stream_ ? ok() : Status(Error{file_ + ": cannot be written"});

@@ -95,7 +95,7 @@ TEST(SensorFacts, ComeBackAndDamagedOnesAreRefused) {
   SensorFacts facts;
   facts.intensity_scale.full_scale = 0.1;
   facts.intensity_scale.is_reflectance = false;
-  facts.typical = {0.83, 0.61};
+  facts.typical = {0.83, 0.61, 0.12};
   facts.typical_pairs = 40;
   facts.look_alikes_log_odds = -1.5;
   const auto back = to_sensor_facts(to_text(facts));
@@ -103,10 +103,14 @@ TEST(SensorFacts, ComeBackAndDamagedOnesAreRefused) {
   EXPECT_EQ((*back)->intensity_scale.full_scale, 0.1);
   EXPECT_FALSE((*back)->intensity_scale.is_reflectance);
   EXPECT_EQ((*back)->typical.intensity_correlation, 0.61);
+  EXPECT_EQ((*back)->typical.residual, 0.12);
   EXPECT_EQ((*back)->typical_pairs, 40u);
   EXPECT_EQ((*back)->look_alikes_log_odds, -1.5);
   EXPECT_EQ((*to_sensor_facts("1 1 0.8 0.9 10"))->look_alikes_log_odds, 0.0) << "of an earlier version";
-  for (const char* damaged : {"x", "0 1 0.8 0.9 10", "1 1 1.8 0.9 10", "nan 1 0.8 0.9 10"})
+  EXPECT_EQ((*to_sensor_facts("1 1 0.8 0.9 10 2.5"))->typical.residual, TypicalAgreement{}.residual)
+      << "of another one";
+  for (const char* damaged : {"x", "0 1 0.8 0.9 10", "1 1 1.8 0.9 10", "nan 1 0.8 0.9 10", "1 1 0.8 0.9 10 0 0",
+                              "1 1 0.8 0.9 10 0 -1", "1 1 0.8 0.9 10 0 x"})
     EXPECT_FALSE(to_sensor_facts(damaged)) << damaged;
 }
 

@@ -36,8 +36,9 @@ struct Differing {
   static constexpr double kDown = 1.5, kDownALittle = 1.15, kUp = 3.0;  ///< ratios of slopes
   static constexpr float kNarrower_rad = 1.05f;                         ///< of the sectors that they see
   static constexpr float kHalfOfAll_rad = 3.14f;                        ///< both sectors are narrow below
-  /// Of what fits between two scans of one sensor: each thins what it sees by where its own lines lie.
-  static constexpr double kShare = 0.8;
+  /// Of what fits between two scans of one sensor, and of its residual: each thins what it sees by where its own lines
+  /// lie.
+  static constexpr double kShare = 0.8, kResidual = 1.13;
 };
 
 bool sensors_differ(const SensorView& a, const SensorView& b) {
@@ -79,6 +80,8 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
     all.intensity_agreement = *agreement.intensity_correlation / view.typical.intensity_correlation;
   all.rmse_m = agreement.rmse_m;
   all.voxel_m = scale.voxel_m;
+  all.residual_share =
+      all.rmse_m / scale.voxel_m / (view.typical.residual * (all.sensors_differ ? Differing::kResidual : 1.0));
   all.in_the_open = scale.in_the_open;
   all.one_in_a_room = match.is_in_the_open() != query.is_in_the_open();
   all.least_fixed = agreement.least_fixed;

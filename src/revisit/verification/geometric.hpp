@@ -39,9 +39,9 @@ struct GeometricEvidence {
   /// Whether this one scan is enough to know the place. Of a room it must show more, since scans of another building
   /// reach log odds of 5, a few of them 7 (docs/maps.md).
   bool decides_alone() const {
-    constexpr double kSureInRooms = 6.0;  ///< log odds
-    return evidence.decides_alone() && (evidence.in_the_open || own_log_odds >= kSureInRooms);
+    return evidence.decides_alone() && (evidence.in_the_open || own_log_odds >= kSureInRooms_log_odds);
   }
+  static constexpr double kSureInRooms_log_odds = 6.0;
 };
 
 /// What is known of a candidate before it is registered.

@@ -77,6 +77,9 @@ TEST(GeometricConsistency, KnowsWhatTwoSensorsSeeOfAPlace) {
   const GeometricEvidence alike = evidence(match, same), differing = evidence(match, flatter);
   EXPECT_FALSE(alike.evidence.sensors_differ);
   EXPECT_NEAR(alike.evidence.inlier_share, in_sight(match, same, alike) / typical, 1e-9);
+  EXPECT_NEAR(alike.evidence.residual_share, alike.evidence.rmse_m / (1.0 * TypicalAgreement{}.residual), 1e-9);
+  EXPECT_NEAR(differing.evidence.residual_share, differing.evidence.rmse_m / (1.13 * TypicalAgreement{}.residual), 1e-9)
+      << "each thins what it sees by where its own lines lie";
   EXPECT_TRUE(differing.evidence.sensors_differ);
   EXPECT_NEAR(differing.evidence.inlier_share, in_sight(match, flatter, differing) / (typical * 0.8), 1e-9);
   EXPECT_TRUE(evidence(match, higher).evidence.sensors_differ) << "down a little less, and up much farther";

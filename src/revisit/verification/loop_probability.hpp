@@ -16,7 +16,8 @@ struct LoopEvidence {
   double free_space_agreement = 0.0;  ///< smaller of both directions
   /// Correlation of intensities, as a share of that between consecutive scans; none where intensities say nothing.
   std::optional<double> intensity_agreement;
-  double rmse_m = 0.0;      ///< point-to-plane, over the inliers
+  double rmse_m = 0.0;          ///< point-to-plane, over the inliers
+  double residual_share = 1.0;  ///< rmse_m, as a share of that between consecutive scans, both in voxels
   double voxel_m = 1.0;     ///< edge of the voxels that the scans were thinned with: what lengths are measured against
   bool in_the_open = true;  ///< SurfaceCloud::is_in_the_open() of either; rooms resemble one another more
   bool one_in_a_room = false;   ///< one scan is of a room, the other in the open

@@ -57,6 +57,7 @@ TEST(LoopProbability, IsTheModelThatWasLearnt) {
                         .free_space_agreement = 0.95,
                         .intensity_agreement = 0.8,
                         .rmse_m = 0.12,
+                        .residual_share = 1.4,
                         .voxel_m = 0.8,
                         .least_fixed = 0.04,
                         .inliers = 150,
@@ -64,7 +65,7 @@ TEST(LoopProbability, IsTheModelThatWasLearnt) {
   LoopEvidence in_room = evidence;
   in_room.in_the_open = false;
   EXPECT_NEAR(loop_log_odds(evidence), -3.373592623, 1e-8);
-  EXPECT_NEAR(loop_log_odds(in_room), -10.781122114, 1e-8);
+  EXPECT_NEAR(loop_log_odds(in_room), -6.770246355, 1e-8);
   LoopEvidence far = evidence;
   far.distance_m = 20.0;
   evidence.distance_m = 12.0;
@@ -72,9 +73,9 @@ TEST(LoopProbability, IsTheModelThatWasLearnt) {
   evidence.distance_m = 5.0;
   for (LoopEvidence* each : {&evidence, &in_room}) each->intensity_agreement.reset();
   EXPECT_NEAR(loop_log_odds(evidence), -3.045077178, 1e-8);
-  EXPECT_NEAR(loop_log_odds(in_room), -10.467660605, 1e-8);
+  EXPECT_NEAR(loop_log_odds(in_room), -8.137493519, 1e-8);
   in_room.both_are_narrow = true;
-  EXPECT_NEAR(loop_log_odds(in_room), -10.467660605, 1e-8) << "rooms were learnt on with narrow views";
+  EXPECT_NEAR(loop_log_odds(in_room), -8.137493519, 1e-8) << "rooms were learnt on with narrow views";
   evidence.both_are_narrow = true;
   EXPECT_NEAR(loop_log_odds(evidence), -6.045077178, 1e-8);
   evidence.one_is_narrow = true;
@@ -115,6 +116,21 @@ TEST(LoopProbability, WhatIsHiddenCountsInRooms) {
   };
   EXPECT_LT(log_odds(false, 0.3), log_odds(false, 0.05));
   EXPECT_EQ(log_odds(true, 0.3), log_odds(true, 0.05));
+}
+
+// What a hand-held sensor leaves between two scans of one room, another one leaves between two rooms.
+TEST(LoopProbability, InRoomsAResidualCountsAsAShareOfTheSensorsOwn) {
+  const auto log_odds = [](bool in_the_open, double residual_share, double distance_m) {
+    LoopEvidence evidence = usual_revisit();
+    evidence.in_the_open = in_the_open;
+    evidence.residual_share = residual_share;
+    evidence.distance_m = distance_m;
+    return loop_log_odds(evidence);
+  };
+  EXPECT_LT(log_odds(false, 1.5, 1.0), log_odds(false, 1.2, 1.0) - 1.0);
+  EXPECT_EQ(log_odds(false, 0.5, 1.0), log_odds(false, 1.0, 1.0)) << "no scans agree better than scans of one place";
+  EXPECT_EQ(log_odds(false, 1.1, 4.0), log_odds(false, 1.0, 4.0)) << "from farther away it is larger";
+  EXPECT_EQ(log_odds(true, 1.5, 1.0), log_odds(true, 1.0, 1.0));
 }
 
 // A room with a glass front is in the open, its neighbour is not: they see little of each other.

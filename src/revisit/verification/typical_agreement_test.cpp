@@ -28,9 +28,11 @@ TEST(TypicalAgreement, HasDefaultsUntilTenPairsAreKnown) {
   for (int i = 0; i < 9; ++i) EXPECT_TRUE(estimate.add(scan_at(i), scan_at(i + 1), planar_pose(0.5, 0, 0)));
   EXPECT_EQ(estimate.overall().in_sight_ratio, defaults.in_sight_ratio);
   EXPECT_EQ(estimate.overall().intensity_correlation, defaults.intensity_correlation);
+  EXPECT_EQ(estimate.overall().residual, defaults.residual);
   EXPECT_NE(estimate.recent().in_sight_ratio, defaults.in_sight_ratio) << "the last few are known at once";
   estimate.add(scan_at(9), scan_at(10), planar_pose(0.5, 0, 0));
   EXPECT_NE(estimate.overall().in_sight_ratio, defaults.in_sight_ratio);
+  EXPECT_NE(estimate.overall().residual, defaults.residual);
   EXPECT_GT(estimate.overall().intensity_correlation, 0.3);
   EXPECT_LE(estimate.overall().intensity_correlation, 1.0);
 }
@@ -71,6 +73,27 @@ TEST(TypicalAgreement, TheLastPairsCountMore) {
   ASSERT_NE(first, second);
   one.add(scan_at(0), scan_at(4), planar_pose(2.0, 0, 0));
   EXPECT_NEAR(one.recent().in_sight_ratio, 0.7 * first + 0.3 * second, 1e-9);
+}
+
+// Where people stood still for a moment, or all walls were near, the sensor is no better than it was.
+TEST(TypicalAgreement, AResidualIsThatOfTheRecordingOrMoreWhereTheLastPairsHaveMore) {
+  TypicalAgreementEstimate small, large;
+  small.restore({0.8, 0.6, 0.001}, 1000);
+  large.restore({0.8, 0.6, 0.3}, 500);
+  large.restore({0.8, 0.6, 0.6}, 500);
+  EXPECT_EQ(small.overall().residual, 0.02) << "no sensor is without noise";
+  EXPECT_NEAR(large.overall().residual, 0.45, 1e-9) << "the mean";
+  for (TypicalAgreementEstimate* each : {&small, &large}) each->add(scan_at(0), scan_at(1), planar_pose(0.5, 0, 0));
+  EXPECT_GT(small.recent().residual, 0.02);
+  EXPECT_EQ(large.recent().residual, large.overall().residual);
+  const double first = small.recent().residual;
+  small.add(scan_at(0), scan_at(4), planar_pose(2.0, 0, 0));
+  TypicalAgreementEstimate of_second;
+  of_second.restore({0.8, 0.6, 0.001}, 1000);
+  of_second.add(scan_at(0), scan_at(4), planar_pose(2.0, 0, 0));
+  EXPECT_NEAR(small.recent().residual, 0.7 * first + 0.3 * of_second.recent().residual, 1e-9) << "a running mean";
+  small.interrupt();
+  EXPECT_EQ(small.recent().residual, small.overall().residual);
 }
 
 TEST(TypicalAgreement, FromTheSameSpotIntensitiesAgreeTooWellToCount) {
