@@ -31,9 +31,12 @@ struct LoopConstraint {
   /// Inverse covariance of xi where the true pose is T_match_query * small_motion(xi): metres, then radians, in the
   /// query's frame. Small along what the scans do not fix: the length of a corridor.
   Matrix6 information = Matrix6::Identity();
+  double own_log_odds = 0.0;  ///< that the pose is right, by both scans alone: not by the loops before
+  bool in_the_open = true;    ///< or in rooms
 
   void archive(auto& fields) {
-    fields(query, match, T_match_query, inlier_ratio, rmse_m, probability, score, information);
+    fields(query, match, T_match_query, inlier_ratio, rmse_m, probability, score, information, own_log_odds,
+           in_the_open);
   }
 };
 

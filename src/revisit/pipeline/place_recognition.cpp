@@ -153,7 +153,8 @@ void PlaceRecognition::answer(Hypothesis hypothesis, const ScanGeometry& query_g
     const GeometricEvidence& found = *hypothesis.geometric;
     detection.loop = LoopConstraint{
         detection.frame,       hypothesis.candidate.match, found.T_match_query, found.evidence.inlier_ratio,
-        found.evidence.rmse_m, found.probability,          detection.score,     found.information};
+        found.evidence.rmse_m, found.probability,          detection.score,     found.information,
+        found.own_log_odds,    found.evidence.in_the_open};
   }
   detection.answer = hypothesis.candidate;
   detection.temporal = hypothesis.temporal;

@@ -18,6 +18,9 @@ struct Consistency {
   // and aisles are shorter, or show their ends.
   static constexpr std::size_t kFewestToJoin = 6;
   static constexpr double kLengthToJoin_m = 20.0;
+  // In rooms, as sure in the mean as a loop must be alone: one look-alike of another building, and those that follow
+  // from it, agree with each other for as long as the corridors do.
+  static constexpr double kOwnInRooms_log_odds = 3.0;
   // Likewise where tracking was lost, and the loops say that the robot was still there when it went on.
   static constexpr std::size_t kFewestToGoOn = 3;
   static constexpr double kLengthToGoOn_m = 5.0, kStillThere_m = 5.0;
@@ -94,9 +97,24 @@ bool LoopGate::goes_on_where_it_was(const LoopConstraint& loop) const {
   });
 }
 
+// Of these loops, those in rooms show enough by themselves.
+bool LoopGate::rooms_are_the_same(const LoopConstraint& loop, const std::vector<const LoopConstraint*>& agreeing) {
+  double sum = 0.0;
+  std::size_t rooms = 0;
+  const auto count = [&](const LoopConstraint& each) {
+    if (each.in_the_open) return;
+    sum += each.own_log_odds;
+    ++rooms;
+  };
+  count(loop);
+  for (const LoopConstraint* each : agreeing) count(*each);
+  return sum >= Consistency::kOwnInRooms_log_odds * static_cast<double>(rooms);
+}
+
 bool LoopGate::may_join(const LoopConstraint& loop, const std::vector<const LoopConstraint*>& agreeing) const {
   const bool goes_on = goes_on_where_it_was(loop);
   if (agreeing.size() + 1 < (goes_on ? Consistency::kFewestToGoOn : Consistency::kFewestToJoin)) return false;
+  if (!goes_on && !rooms_are_the_same(loop, agreeing)) return false;
   double queries_m = 0.0, matches_m = 0.0;
   for (const LoopConstraint* a : agreeing)
     for (const LoopConstraint* b : agreeing) {

@@ -61,6 +61,7 @@ class LoopGate {
   bool is_overdue(const LoopConstraint& loop) const;
   bool joins_sessions(const LoopConstraint& loop) const;
   bool goes_on_where_it_was(const LoopConstraint& loop) const;
+  static bool rooms_are_the_same(const LoopConstraint& loop, const std::vector<const LoopConstraint*>& agreeing);
   bool may_join(const LoopConstraint& loop, const std::vector<const LoopConstraint*>& agreeing) const;
   int root(int segment) const;
   Decision decide_alone(const LoopConstraint& loop) const;

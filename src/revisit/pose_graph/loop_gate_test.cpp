@@ -181,6 +181,34 @@ TEST(LoopGate, SessionsAreJoinedByManyLoopsOverALongWay) {
   EXPECT_EQ(joined_by(6, 5, against), 0u) << "another loop says 26 m on";
 }
 
+// A corridor of another building that looks the same: what follows from one look-alike agrees with it.
+TEST(LoopGate, SessionsAreJoinedInRoomsByLoopsThatAreSureOfThemselves) {
+  const auto is_joined_by = [](bool in_the_open, double own_log_odds, double own_log_odds_of_last) {
+    LoopGate gate;
+    for (int session = 0; session < 2; ++session) {
+      TrajectoryPoint point{.segment = session, .origin = session};
+      for (int i = 0; i < 40; ++i) {
+        gate.add_keyframe(in_map(session, {i}), point);
+        point = point.after(planar_pose(1, 0, 0));
+      }
+    }
+    std::size_t entered = 0;
+    for (int i = 0; i < 6; ++i) {
+      LoopConstraint each = loop(0, 5 * i, 0.0, 0.9999);
+      each.query = in_map(1, {5 * i});
+      each.in_the_open = in_the_open;
+      each.own_log_odds = i < 5 ? own_log_odds : own_log_odds_of_last;
+      entered += gate.offer(each).size();
+    }
+    return entered > 0;
+  };
+  EXPECT_TRUE(is_joined_by(false, 4.0, 4.0));
+  EXPECT_FALSE(is_joined_by(false, 2.0, 2.0)) << "what they fit by is that they follow from each other";
+  EXPECT_TRUE(is_joined_by(false, 2.0, 8.0)) << "three in the mean";
+  EXPECT_FALSE(is_joined_by(false, 3.1, 2.0));
+  EXPECT_TRUE(is_joined_by(true, 2.0, 2.0)) << "streets differ more";
+}
+
 TEST(LoopGate, ASessionGoesOnWhereItLostTrack) {
   const LoopGate gate = gate_that_lost_track(2.0);
   ASSERT_EQ(gate.part(in_map(1, {10})), 0);
