@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include <revisit/localisation/following_trust.hpp>
 #include <revisit/localisation/pose_belief.hpp>
 #include <revisit/localisation/saved_places.hpp>
 #include <revisit/odometry/odometry.hpp>
@@ -69,6 +70,7 @@ class Localiser {
   Result<std::optional<Twist>> motion_of(const PreparedScan& scan, const Detection& detection) const;
   /// The places nearest to a pose in a part of the map, the nearest first, with the pose relative to each.
   std::vector<PosePrediction> nearest_places(const Pose& T_map_lidar, int part, std::size_t count) const;
+  bool is_sure(const PoseBelief::Hypothesis& best, const Detection& detection) const;
   Status look_nearby(const PreparedScan& scan, Detection& detection);
   Status look_where_expected(const PreparedScan& scan, const TrajectoryPoint& point, Detection& detection);
   /// What it is worth to be where somebody expects it: as much as there is elsewhere.
@@ -88,6 +90,7 @@ class Localiser {
     FrameId match;
     Matrix6 information = Matrix6::Zero();
     double probability = 0.0;
+    FollowingTrust trust = {};
   };
 
   struct Expected {

@@ -70,6 +70,15 @@ Result<Localisation> Localiser::follow(Scan scan, const std::optional<Pose>& T_e
   return result;
 }
 
+// Rooms that look alike do so for some metres: scans in a row must show as much as one that decides alone.
+bool Localiser::is_sure(const PoseBelief::Hypothesis& best, const Detection& detection) const {
+  const bool in_a_room = std::any_of(detection.registered.begin(), detection.registered.end(), [&](const auto& each) {
+    return each.match == best.match && !each.evidence.evidence.in_the_open;
+  });
+  return in_a_room ? best.log_odds >= GeometricEvidence::kSureInRooms_log_odds
+                   : probability_of(best.log_odds) >= parameters_.geometric.min_probability;
+}
+
 Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const TrajectoryPoint& point) {
   auto detection = recognition_.find(scan, places(), typical_);
   if (!detection) return detection.error();
@@ -92,7 +101,7 @@ Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const Trajecto
   const double probability = best ? probability_of(best->log_odds) : 0.0;
   if (detection->loop) {
     result = found(scan.scan.frame, *detection->loop);
-  } else if (best && probability >= parameters_.geometric.min_probability) {
+  } else if (best && is_sure(*best, *detection)) {
     result.status = Localisation::Status::kFound;
     result.T_map_lidar = best->T_map_segment * point.T_segment_lidar;
     result.probability = probability;
@@ -172,6 +181,13 @@ Result<Localisation> Localiser::stay(const PreparedScan& scan, const TrajectoryP
       const Pose off = prediction->T_match_query.inverse() * evidence.T_match_query;
       const double least =
           evidence.evidence.one_is_narrow ? Staying::kLeastOfNarrow_log_odds : Staying::kLeast_log_odds;
+      const FollowingTrust trust =
+          state.trust.after(evidence.own_log_odds - least + Staying::kLeast_log_odds, travelled_m);
+      if (trust.is_gone()) {
+        following_.reset();
+        result.reason = "what was seen over the last metres is not what the map shows here";
+        return result;
+      }
       if (evidence.own_log_odds >= least &&
           off.translation().norm() <= Staying::kMost_m + Staying::kMost_mAMetre * travelled_m &&
           rotation_angle(off) <= to_radians(Staying::kMost_deg)) {
@@ -186,7 +202,8 @@ Result<Localisation> Localiser::stay(const PreparedScan& scan, const TrajectoryP
                  state.part,
                  result.match,
                  result.information,
-                 result.probability};
+                 result.probability,
+                 trust};
         return result;
       }
       result.reason = format("does not fit the map where it is predicted: inliers %.2f, %.2f m off",
