@@ -13,6 +13,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <mutex>
 #include <random>
 #include <string>
@@ -106,8 +107,33 @@ class Disk {
     return length > 0 ? std::string(path, static_cast<std::size_t>(length)) : std::string();
   }
 
-  // All that was not synced is taken back; some of it is then written again, in its order.
+  // No thread of the program runs on: another process stops it, sees to the disk, and kills it.
   [[noreturn]] void fail() {
+    const pid_t program = getpid();
+    if (fork() == 0) {
+      kill(program, SIGSTOP);
+      while (!is_stopped(program)) usleep(100);
+      leave_what_reached_the_disk();
+      kill(program, SIGKILL);
+      _exit(0);
+    }
+    while (true) pause();
+  }
+
+  static bool is_stopped(pid_t program) {
+    for (const auto& thread : std::filesystem::directory_iterator("/proc/" + std::to_string(program) + "/task")) {
+      char text[512] = {};
+      const int file = open((thread.path() / "stat").c_str(), O_RDONLY | O_CLOEXEC);
+      (void)!read(file, text, sizeof text - 1);
+      close(file);
+      const char* const name_end = std::strrchr(text, ')');  // "12 (name) T ..."
+      if (name_end != nullptr && name_end[2] != 'T') return false;
+    }
+    return true;
+  }
+
+  // All that was not synced is taken back; some of it is then written again, in its order.
+  void leave_what_reached_the_disk() {
     static auto* const write_at = reinterpret_cast<decltype(&pwrite)>(dlsym(RTLD_NEXT, "pwrite"));
     static auto* const set_length = reinterpret_cast<decltype(&ftruncate)>(dlsym(RTLD_NEXT, "ftruncate"));
     for (auto it = changes_.rbegin(); it != changes_.rend(); ++it) {
@@ -127,8 +153,6 @@ class Disk {
         (void)!write_at(file, each.data.data(), each.data.size(), each.at);
       close(file);
     }
-    kill(getpid(), SIGKILL);
-    std::abort();
   }
 
   std::string folder_;

@@ -150,6 +150,21 @@ TEST(CollectMap, HoldsThePointsOfTheFiles) {
   for (std::size_t i = 0; i < filed.size(); ++i) ASSERT_FLOAT_EQ((*points)[i].x, filed[i].x) << i;
 }
 
+TEST(TileFiles, AFileThatIsEmptyOrGoneMeanwhileIsAnError) {
+  const fs::path folder = fresh_folder("tile_files");
+  mapping_internal::TileFiles files(folder, 10.0);
+  ASSERT_TRUE(files.add({{1.f, 2.f, 3.f, 0.5f, 0, 0}}));
+  ASSERT_TRUE(files.flush());
+  ASSERT_EQ(files.tiles().size(), 1u);
+  const fs::path file = fs::directory_iterator(folder)->path();
+  fs::resize_file(file, 0);
+  const auto emptied = files.take(files.tiles().front());
+  ASSERT_FALSE(emptied);
+  EXPECT_NE(emptied.error().message.find(file.string()), std::string::npos) << emptied.error().message;
+  fs::remove(file);
+  EXPECT_FALSE(files.take(files.tiles().front()));
+}
+
 TEST(OnePointAVoxel, IsTheMean) {
   const auto points = mapping_internal::one_point_a_voxel(
       {{0.01f, 0.01f, -0.01f, 0.2f, 1, 7}, {0.03f, 0.05f, -0.03f, 0.4f, 2, 9}, {0.3f, 0.f, 0.f, 1.f}}, 0.2);

@@ -66,6 +66,7 @@ Result<std::vector<MapPoint>> TileFiles::take(const TileIndex& tile) const {
   std::ifstream stream(file(tile), std::ios::binary);
   stream.read(reinterpret_cast<char*>(points.data()), static_cast<std::streamsize>(points.size() * sizeof(MapPoint)));
   if (!stream) return Error{file(tile).string() + ": cannot be read back"};
+  if (points.empty()) return Error{file(tile).string() + ": holds no point, though some were written; who changed it?"};
   std::filesystem::remove(file(tile), failure);
   return points;
 }

@@ -28,7 +28,8 @@ class TileFiles {
   Status replace(const TileIndex& tile, const std::vector<MapPoint>& points) const;
   Status flush();
   std::vector<TileIndex> tiles() const;
-  /// All points of a tile, which is flushed; its file is gone afterwards.
+  /// All points of a tile, at least one, which is flushed; its file is gone afterwards. An error names a file that is
+  /// gone or was emptied meanwhile.
   Result<std::vector<MapPoint>> take(const TileIndex& tile) const;
 
  private:
