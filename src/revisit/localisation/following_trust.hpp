@@ -3,17 +3,19 @@
 
 #include <algorithm>
 
+#include <revisit/localisation/pose_belief.hpp>
+
 namespace revisit {
 
-/// How much a robot that is followed in a map is still believed to be there. Where it woke up in a place that looks the
-/// same, the next scans fit after a fashion, but what they show differs: their log odds take the trust away, a little
-/// more with each view, and at last it is lost.
+/// Whether a robot that is followed through rooms of a map is still believed to be where it is followed. If it woke up
+/// in a look-alike, the next scans can be registered there, but each alone speaks against the place: their log odds are
+/// added up, and below 0 the robot is lost. A value: safe to copy and to read from several threads.
 class FollowingTrust {
  public:
-  /// After one more scan, registered where it was predicted; `own_log_odds` is what this scan shows by itself,
-  /// `travelled_m` the way since the last one that was followed: scans of one view count once, as in PoseBelief.
+  /// After one more scan, registered where it was predicted. `own_log_odds` that the pose is right, by this scan alone;
+  /// `travelled_m` since the last scan that was followed: scans of one view count once, as in PoseBelief.
   FollowingTrust after(double own_log_odds, double travelled_m) const {
-    const double view = std::clamp(travelled_m / kAnotherView_m, 0.0, 1.0);
+    const double view = std::clamp(travelled_m / PoseBelief::kAnotherView_m, 0.0, 1.0);
     FollowingTrust next;
     next.log_odds_ = std::min(kMost, log_odds_ + view * std::clamp(own_log_odds, -kOneView, kOneView));
     return next;
@@ -21,7 +23,6 @@ class FollowingTrust {
   bool is_gone() const { return log_odds_ < 0.0; }
 
  private:
-  static constexpr double kAnotherView_m = 3.0;
   static constexpr double kMost = 6.0, kOneView = 2.0;  ///< log odds: in all, and what one view adds or takes
   double log_odds_ = kMost;
 };

@@ -8,7 +8,6 @@ namespace revisit {
 namespace {
 
 struct Adding {
-  static constexpr double kAnotherView_m = 3.0;  ///< travelled, after which a scan is evidence of its own
   static constexpr double kMetresARadian = 3.0;  ///< a turn shows as much anew as so many metres
   static constexpr double kMost = 6.0;           ///< log odds that one view adds, either way
   static constexpr double kNotSeenAgain = -1.0;  ///< for a view that does not confirm it
@@ -26,8 +25,8 @@ void PoseBelief::add(const TrajectoryPoint& point, std::span<const Sighting> sig
   }
   const double moved_m =
       last_ ? point.travelled_m - last_->travelled_m + Adding::kMetresARadian * (point.turned_rad - last_->turned_rad)
-            : Adding::kAnotherView_m;
-  const double weight = std::clamp(moved_m / Adding::kAnotherView_m, 0.0, 1.0);
+            : kAnotherView_m;
+  const double weight = std::clamp(moved_m / kAnotherView_m, 0.0, 1.0);
   last_ = point;
   std::vector<bool> is_seen(hypotheses_.size(), false);
   for (const Sighting& sighting : sightings) {
@@ -40,13 +39,14 @@ void PoseBelief::add(const TrajectoryPoint& point, std::span<const Sighting> sig
              rotation_angle(error) <= to_radians(Adding::kSame_deg);
     });
     if (known == hypotheses_.end()) {
-      hypotheses_.push_back(
-          {sighting.match, sighting.part, T_map_segment, sighting.log_odds + sighting.prior_log_odds});
+      hypotheses_.push_back({sighting.match, sighting.part, T_map_segment, sighting.log_odds + sighting.prior_log_odds,
+                             sighting.in_the_open});
       continue;
     }
     const auto i = static_cast<std::size_t>(known - hypotheses_.begin());
     known->match = sighting.match;
     known->T_map_segment = T_map_segment;
+    known->in_the_open = sighting.in_the_open;
     if (i >= is_seen.size()) {  // of this scan already: another place says the same
       known->log_odds = std::max(known->log_odds, sighting.log_odds + sighting.prior_log_odds);
     } else if (!is_seen[i]) {

@@ -14,6 +14,8 @@ namespace revisit {
 /// places, the way from scan to scan fits at one. Belongs to one thread at a time.
 class PoseBelief {
  public:
+  static constexpr double kAnotherView_m = 3.0;  ///< travelled, after which a scan is evidence of its own
+
   /// A pose at which one scan was registered.
   struct Sighting {
     FrameId match;
@@ -21,12 +23,14 @@ class PoseBelief {
     Pose T_map_lidar = Pose::Identity();
     double log_odds = 0.0;        ///< by the evidence of this scan alone
     double prior_log_odds = 0.0;  ///< known without it; counts once, however many scans there are
+    bool in_the_open = true;      ///< or in a room
   };
   struct Hypothesis {
     FrameId match;  ///< of the last sighting
     int part = 0;
     Pose T_map_segment = Pose::Identity();  ///< of the odometry's segment
     double log_odds = 0.0;
+    bool in_the_open = true;  ///< at the last sighting; or in a room
   };
 
   /// The scan at this point of the trajectory was registered at these poses. Scans of one view count once: evidence

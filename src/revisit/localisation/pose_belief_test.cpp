@@ -46,6 +46,25 @@ TEST(PoseBelief, TheSameViewCountsOnce) {
   EXPECT_LT(drive.belief.best()->log_odds, 1.1);
 }
 
+// Rooms ask for more, and go on to do so where a scan saw something else.
+TEST(PoseBelief, RemembersWhetherItWasSeenInARoom) {
+  Drive drive;
+  auto sighting = drive.seen(4.0);
+  EXPECT_TRUE(sighting.in_the_open);
+  sighting.in_the_open = false;
+  drive.belief.add(drive.point, std::span(&sighting, 1));
+  EXPECT_FALSE(drive.belief.best()->in_the_open);
+  drive.go(0.3);
+  const auto other = drive.seen(1.0, planar_pose(40, 0, 0), 2);
+  drive.belief.add(drive.point, std::span(&other, 1));
+  EXPECT_EQ(drive.belief.best()->match, FrameId{1});
+  EXPECT_FALSE(drive.belief.best()->in_the_open);
+  drive.go(0.3);
+  const auto again = drive.seen(1.0);
+  drive.belief.add(drive.point, std::span(&again, 1));
+  EXPECT_TRUE(drive.belief.best()->in_the_open) << "it went out of the door";
+}
+
 // Two places look alike; further on only one of them fits.
 TEST(PoseBelief, OfTwoPlacesTheWayDecides) {
   Drive drive;

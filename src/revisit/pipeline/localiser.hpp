@@ -70,7 +70,9 @@ class Localiser {
   Result<std::optional<Twist>> motion_of(const PreparedScan& scan, const Detection& detection) const;
   /// The places nearest to a pose in a part of the map, the nearest first, with the pose relative to each.
   std::vector<PosePrediction> nearest_places(const Pose& T_map_lidar, int part, std::size_t count) const;
-  bool is_sure(const PoseBelief::Hypothesis& best, const Detection& detection) const;
+  /// Whether scans in a row showed enough. In rooms as much as one scan that decides alone: look-alikes go on for
+  /// metres.
+  bool is_sure(const PoseBelief::Hypothesis& best) const;
   Status look_nearby(const PreparedScan& scan, Detection& detection);
   Status look_where_expected(const PreparedScan& scan, const TrajectoryPoint& point, Detection& detection);
   /// What it is worth to be where somebody expects it: as much as there is elsewhere.
@@ -90,7 +92,7 @@ class Localiser {
     FrameId match;
     Matrix6 information = Matrix6::Zero();
     double probability = 0.0;
-    FollowingTrust trust = {};
+    FollowingTrust trust = {};  ///< that it is there
   };
 
   struct Expected {

@@ -70,13 +70,9 @@ Result<Localisation> Localiser::follow(Scan scan, const std::optional<Pose>& T_e
   return result;
 }
 
-// Rooms that look alike do so for some metres: scans in a row must show as much as one that decides alone.
-bool Localiser::is_sure(const PoseBelief::Hypothesis& best, const Detection& detection) const {
-  const bool in_a_room = std::any_of(detection.registered.begin(), detection.registered.end(), [&](const auto& each) {
-    return each.match == best.match && !each.evidence.evidence.in_the_open;
-  });
-  return in_a_room ? best.log_odds >= GeometricEvidence::kSureInRooms_log_odds
-                   : probability_of(best.log_odds) >= parameters_.geometric.min_probability;
+bool Localiser::is_sure(const PoseBelief::Hypothesis& best) const {
+  return probability_of(best.log_odds) >= parameters_.geometric.min_probability &&
+         (best.in_the_open || best.log_odds >= GeometricEvidence::kSureInRooms_log_odds);
 }
 
 Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const TrajectoryPoint& point) {
@@ -92,7 +88,8 @@ Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const Trajecto
     const double log_odds = each.evidence.decides_alone()
                                 ? each.evidence.own_log_odds
                                 : std::min(each.evidence.own_log_odds, Waking::kOneView_log_odds);
-    sightings.push_back({each.match, part, T_map_lidar, log_odds, expectation_log_odds(T_map_lidar, part, point)});
+    sightings.push_back({each.match, part, T_map_lidar, log_odds, expectation_log_odds(T_map_lidar, part, point),
+                         each.evidence.evidence.in_the_open});
   }
   belief_.add(point, sightings);
   Localisation result;
@@ -101,7 +98,7 @@ Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const Trajecto
   const double probability = best ? probability_of(best->log_odds) : 0.0;
   if (detection->loop) {
     result = found(scan.scan.frame, *detection->loop);
-  } else if (best && is_sure(*best, *detection)) {
+  } else if (best && is_sure(*best)) {
     result.status = Localisation::Status::kFound;
     result.T_map_lidar = best->T_map_segment * point.T_segment_lidar;
     result.probability = probability;
@@ -181,8 +178,11 @@ Result<Localisation> Localiser::stay(const PreparedScan& scan, const TrajectoryP
       const Pose off = prediction->T_match_query.inverse() * evidence.T_match_query;
       const double least =
           evidence.evidence.one_is_narrow ? Staying::kLeastOfNarrow_log_odds : Staying::kLeast_log_odds;
+      // Streets differ enough, and of a sector of one a right pose shows little.
       const FollowingTrust trust =
-          state.trust.after(evidence.own_log_odds - least + Staying::kLeast_log_odds, travelled_m);
+          evidence.evidence.in_the_open
+              ? state.trust
+              : state.trust.after(evidence.own_log_odds - least + Staying::kLeast_log_odds, travelled_m);
       if (trust.is_gone()) {
         following_.reset();
         result.reason = "what was seen over the last metres is not what the map shows here";
