@@ -147,17 +147,23 @@ LoopGate gate_that_lost_track(double gap_m) {
   return gate;
 }
 
+// Two sessions, 59 m each, a key frame every metre; nothing is known of how they lie to each other.
+LoopGate gate_of_two_sessions() {
+  LoopGate gate;
+  for (int session = 0; session < 2; ++session) {
+    TrajectoryPoint point{.segment = session, .origin = session};
+    for (int i = 0; i < 60; ++i) {
+      gate.add_keyframe(in_map(session, {i}), point);
+      point = point.after(planar_pose(1, 0, 0));
+    }
+  }
+  return gate;
+}
+
 // What a session needs to be joined: at least six loops that agree, over 20 m, and none against them.
 TEST(LoopGate, SessionsAreJoinedByManyLoopsOverALongWay) {
   const auto joined_by = [](int count, int every_m, const std::optional<LoopConstraint>& against) {
-    LoopGate gate;
-    for (int session = 0; session < 2; ++session) {
-      TrajectoryPoint point{.segment = session, .origin = session};
-      for (int i = 0; i < 60; ++i) {
-        gate.add_keyframe(in_map(session, {i}), point);
-        point = point.after(planar_pose(1, 0, 0));
-      }
-    }
+    LoopGate gate = gate_of_two_sessions();
     std::vector<LoopConstraint> loops;
     for (int i = 0; i < count; ++i) loops.push_back(loop(0, every_m * i, 0.0, 0.9999));
     for (int i = 0; i < count; ++i) loops[static_cast<std::size_t>(i)].query = in_map(1, {every_m * i});
@@ -184,14 +190,7 @@ TEST(LoopGate, SessionsAreJoinedByManyLoopsOverALongWay) {
 // A corridor of another building that looks the same: what follows from one look-alike agrees with it.
 TEST(LoopGate, SessionsAreJoinedInRoomsByLoopsThatAreSureOfThemselves) {
   const auto is_joined_by = [](bool in_the_open, double own_log_odds, double own_log_odds_of_last) {
-    LoopGate gate;
-    for (int session = 0; session < 2; ++session) {
-      TrajectoryPoint point{.segment = session, .origin = session};
-      for (int i = 0; i < 40; ++i) {
-        gate.add_keyframe(in_map(session, {i}), point);
-        point = point.after(planar_pose(1, 0, 0));
-      }
-    }
+    LoopGate gate = gate_of_two_sessions();
     std::size_t entered = 0;
     for (int i = 0; i < 6; ++i) {
       LoopConstraint each = loop(0, 5 * i, 0.0, 0.9999);
