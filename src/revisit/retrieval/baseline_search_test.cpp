@@ -74,6 +74,17 @@ TEST(BaselineSearch, AnswersTheMostAlikeOfTheScansThatArePlaces) {
   EXPECT_EQ(by_index->row.match->value, 15);
 }
 
+TEST(BaselineSearch, TheLastScanIsComparedWithAnyFrame) {
+  BaselineSearch search(std::make_unique<Numbers>(1), ExclusionRule{1, 0.0});
+  for (int i = 0; i < 5; ++i) {
+    const std::vector<Point> points{{static_cast<float>(i), 0.f, 0.f, 0.f}};
+    search.process({FrameId{2 * i}, 0.1 * i}, points, 0.0);
+  }
+  EXPECT_EQ(search.similarity_to(FrameId{2}), -3.0);
+  EXPECT_FALSE(search.similarity_to(FrameId{3}));
+  EXPECT_FALSE(search.similarity_to(FrameId{10}));
+}
+
 TEST(BaselineSearch, NothingInCommonIsNoAnswer) {
   const auto answer = answer_after_twenty(std::make_unique<Numbers>(1), 500.f);
   ASSERT_TRUE(answer);

@@ -179,7 +179,7 @@ Result<std::vector<NearImage>> nearest_images(const PlaceStore& store, std::size
   if (parts == 1) {
     compared = Part(shared, 0, places, result).search();
   } else {
-    const std::size_t part_size = ((places + parts - 1) / parts + kBlock - 1) / kBlock * kBlock;
+    const std::size_t part_size = (places / parts / kBlock + 1) * kBlock;
     std::vector<std::vector<NearImage>> found(parts);
     std::atomic<std::size_t> sum = 0;
     tbb::task_arena arena(std::min(threads, tbb::this_task_arena::max_concurrency()));

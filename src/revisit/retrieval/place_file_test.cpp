@@ -168,6 +168,11 @@ TEST_F(PlaceFile, AnAlteredImageIsNoticedByTheSearchThatMeetsIt) {
   EXPECT_NE(found.error().message.find("other.places: places 0 to 4095"), std::string::npos) << found.error().message;
   EXPECT_FALSE(index->find(FrameId{0}));
   EXPECT_FALSE(index->save(path)) << "what is damaged is not saved as sound";
+
+  altered = bytes(path);
+  altered[altered.size() - 1] ^= 1;  // in the second chunk
+  const std::string error = error_of(written(altered));
+  EXPECT_NE(error.find("places 4096 to 8191 do not have"), std::string::npos) << error;
 }
 
 // Numbers of the header as they lie in the file (docs/formats.md).
@@ -187,6 +192,8 @@ TEST_F(PlaceFile, AHeaderThatCannotBeIsRefused) {
     for (const auto& [at, value] : {std::pair{kRings, 512u}, {kSectors, 720u}, {kLevels, 8u}})
       EXPECT_NE(error_with(at, value, 4).find(" bytes instead of the "), std::string::npos) << at << " " << value;
     EXPECT_NE(error_with(kPlaces, std::uint64_t{1} << 40, 8).find("names 1099511627776 places"), std::string::npos);
+    EXPECT_NE(error_with(kPlaces, std::uint64_t{1} << 28, 8).find(" bytes instead of the "), std::string::npos);
+    EXPECT_NE(error_with(kPlaces, (std::uint64_t{1} << 28) + 1, 8).find("; allowed: "), std::string::npos);
     EXPECT_NE(error_with(kPlaces, static_cast<std::uint64_t>(places) + 1, 8).find("checksum"), std::string::npos)
         << "as many chunks";
     EXPECT_NE(error_with(8, 0x04030201, 4).find("other byte order"), std::string::npos);

@@ -29,7 +29,7 @@ std::vector<LoopCandidate> best_apart(const std::vector<LoopCandidate>& sorted, 
     const bool is_apart = std::none_of(result.begin(), result.end(), [&](const LoopCandidate& other) {
       return std::abs(each.match.value - other.match.value) <= separation;
     });
-    if (separation == 0 || is_apart) result.push_back(each);
+    if (is_apart) result.push_back(each);
   }
   return result;
 }

@@ -107,6 +107,28 @@ TEST(PlaceIndex, GatesAndShortlistAreKept) {
   EXPECT_EQ(filled(options, 100).search(random_context(5), 100)->size(), 1u);
 }
 
+// Without layers of height the score follows from the distance: what passes by exactly nothing is found, too.
+TEST(PlaceIndex, AScoreAtTheGateIsFoundWhateverItsRounding) {
+  DescriptorOptions flat;
+  flat.levels = 0;
+  const IntensityScanContext query = describe(testing_support::random_points(600, 4), flat);
+  IntensityScanContext other = query;
+  for (std::size_t i = 0; i < 300; ++i) {
+    other.occupancy[i / 64] ^= std::uint64_t{1} << (i % 64);
+    RetrievalOptions options;
+    const double score = match_descriptors(query, other).geometry_score;
+    options.min_geometry_score = score;
+    options.min_intensity_score = 0.0;
+    PlaceIndex index(options);
+    index.add(FrameId{0}, 0.0, other);
+    EXPECT_EQ(index.search(query, 1)->size(), 1u) << score;
+    options.min_geometry_score = score + 1e-9;
+    PlaceIndex stricter(options);
+    stricter.add(FrameId{0}, 0.0, other);
+    EXPECT_TRUE(stricter.search(query, 1)->empty()) << score;
+  }
+}
+
 TEST(PlaceIndex, MisuseThrows) {
   PlaceIndex index = filled({}, 3);
   EXPECT_THROW(index.add(FrameId{2}, 1.0, random_context(1)), std::invalid_argument);
@@ -114,6 +136,8 @@ TEST(PlaceIndex, MisuseThrows) {
   other.rings = 5;
   EXPECT_THROW(index.add(FrameId{9}, 1.0, describe({}, other)), std::invalid_argument);
   EXPECT_FALSE(index.find(FrameId{9}));
+  index.add(FrameId{7}, 1.0, random_context(7));
+  EXPECT_FALSE(index.find(FrameId{5})) << "between two that are there";
   ASSERT_TRUE(index.find(FrameId{2}));
   EXPECT_EQ(index.find(FrameId{2})->occupancy[0], random_context(2).occupancy[0]);
 
