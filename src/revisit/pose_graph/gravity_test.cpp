@@ -125,16 +125,17 @@ TEST(Gravity, FewReadingsRarelyShowDriftWhereThereIsNone) {
   EXPECT_LE(trusted, 5);
 }
 
-// Readings that are off by half a degree each, of a graph that drifts, and of one that does not.
+// Readings that are off by half a degree each, of a graph that drifts, and of one that does not, where a tenth may be
+// wrong.
 TEST(Gravity, CountsWhereTheGraphDriftsMoreThanTheReadingsVary) {
-  for (const bool drifts : {true, false}) {
+  for (const auto& [drifts, wrong] : {std::pair{true, 0}, {false, 0}, {false, 1}}) {
     PitchingDrive drive;
     if (!drifts)
       for (std::size_t i = 0; i < drive.truth.size(); ++i)
         drive.graph.move_node(i, drive.truth[0].inverse() * drive.truth[i]);
     std::mt19937 random(7);
     std::normal_distribution<double> noise(0.0, to_radians(0.3));
-    auto readings = drive.readings(Eigen::Vector3d(0.01, 0.0, 0.0), 0, 2);
+    auto readings = drive.readings(Eigen::Vector3d(0.01, 0.0, 0.0), wrong, 2);
     for (UpReading& each : readings)
       each.up = (each.up + Eigen::Vector3d(noise(random), noise(random), 0.0)).normalized();
     weigh_ups(drive.graph, readings);
