@@ -86,8 +86,10 @@ TEST(Gravity, WrongReadingsLoseTheirWeight) {
   EXPECT_LT(drive.worst_m(), 0.4 * before_m);
 }
 
-// Readings with noise of 0.3 degrees, along a drive whose pitch drifts evenly by so much from one to the next.
-double deviation_deg(std::size_t count, double drift_deg, double step_between_halves_deg, unsigned seed) {
+// Readings with noise of 0.3 degrees, along a drive whose pitch drifts evenly by so much from one to the next, in each
+// half anew if it turns back.
+double deviation_deg(std::size_t count, double drift_deg, double step_between_halves_deg, unsigned seed,
+                     bool turns_back = false) {
   PoseGraph graph;
   std::vector<UpReading> readings;
   std::mt19937 random(seed);
@@ -97,9 +99,9 @@ double deviation_deg(std::size_t count, double drift_deg, double step_between_ha
   for (std::size_t i = 0; i < count; ++i) {
     const bool is_second = step_between_halves_deg > 0.0 && i >= count / 2;
     Pose T = Pose::Identity();
-    T.rotate(
-        Eigen::AngleAxisd(to_radians(drift_deg * static_cast<double>(i) + (is_second ? step_between_halves_deg : 0.0)),
-                          Eigen::Vector3d::UnitY()));
+    const auto drifted = static_cast<double>(turns_back ? i % (count / 2) : i);
+    T.rotate(Eigen::AngleAxisd(to_radians(drift_deg * drifted + (is_second ? step_between_halves_deg : 0.0)),
+                               Eigen::Vector3d::UnitY()));
     graph.add_node(T);
     if (i > 0) graph.add_edge({i - 1, i, Pose::Identity(), information});
     readings.push_back({i, Eigen::Vector3d(noise(random), noise(random), 1.0).normalized(), 0, is_second ? 1 : 0});
@@ -115,6 +117,12 @@ TEST(Gravity, NoiseIsToldFromEvenDrift) {
       EXPECT_GT(deviation, 0.2) << count << " " << drift_deg;
       EXPECT_LT(deviation, 0.6) << count << " " << drift_deg;
     }
+}
+
+TEST(Gravity, ADriftThatComesBackIsSeenByQuarters) {
+  const double deviation = deviation_deg(400, 0.1, 0.0, 3, true);
+  EXPECT_GT(deviation, 0.2);
+  EXPECT_LT(deviation, 0.6);
 }
 
 TEST(Gravity, PartsThatLieTiltedToEachOtherDoNotDrift) { EXPECT_GT(deviation_deg(120, 0.0, 4.0, 4), 3.0); }
