@@ -26,7 +26,7 @@ struct Steps {
   static constexpr double kAcross = 1e-3;      ///< covariance across a plane, 1 along it (Segal et al., RSS 2009)
   static constexpr double kArm_m = 10.0;       ///< at which turns are weighed against translations
   static constexpr int kMostTilts = 10;        ///< steps of height and tilt alone
-  static constexpr double kAlongAxis = 0.99;   ///< cosine between a normal and the source's z axis: within 8 degrees
+  static constexpr double kAlongAxis = 0.94;   ///< cosine between a normal and the source's z axis: within 20 degrees
   // Points share the errors of the surfaces that they lie on, so that they count for fewer than they are.
   static constexpr double kPointsThatCountAsOne = 10.0, kLeastNoise_m = 0.02;
 };

@@ -35,7 +35,7 @@ struct IcpOptions {
   /// a bare corridor normals are noise. Turns count as the motion of a point 10 m away.
   double least_seen = 0.0;
   /// Point-to-plane: the source was seen by rings of beams about its z axis. Patches that face along that axis, to
-  /// within 8 degrees, then fix nothing across it.
+  /// within 20 degrees, then fix nothing across it.
   bool has_rings = false;
   /// Point-to-plane, where above 0: once settled, height, roll and pitch along the source's axes settle again with each
   /// pair weighed by the noise of points (this, a standard deviation) and the variance of its patch. Only they: along
