@@ -219,6 +219,13 @@ TEST(PlaceStore, IsSearchedWhileItGrows) {
   writer.join();
 }
 
+TEST(PlaceStore, WithoutLayersAPlaceTakesItsImageAlone) {
+  Places places({60, 20}, 9);
+  PlaceStore store;
+  store.add(FrameId{0}, 0.0, places.even(0.3));
+  EXPECT_EQ(store.place_bytes(), revisit_bits_place_bytes(60, 20));
+}
+
 TEST(PlaceStore, StampsThatRunBackwardsDoNotMakeAPlaceOlder) {
   Places places({60, 20}, 9);
   PlaceStore store;

@@ -63,8 +63,8 @@ bool PlaceStore::check(const Chunk& c, std::size_t p) const {
 }
 
 Status PlaceStore::check() const {
-  for (std::size_t i = 0; i < size(); i += kChunk)
-    for (std::size_t part = 0; part < ChunkLayout::kParts; ++part)
+  for (std::size_t i = 0; i < size(); i += kChunk)  // bounds were when it was opened
+    for (std::size_t part = ChunkLayout::kImages; part < ChunkLayout::kParts; ++part)
       if (!is_intact(chunk(i), part)) return damage(i);
   return ok();
 }
