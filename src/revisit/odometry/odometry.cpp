@@ -83,7 +83,7 @@ OdometryStep Odometry::take(const Scan& scan, double stamp_s, const std::optiona
 OdometryStep Odometry::match(const Scan& scan, double stamp_s, const std::optional<Pose>& T_previous_lidar,
                              bool is_guess) {
   const bool is_swept = !scan.times_s.empty() && follows(stamp_s);
-  if (!matcher_.has_map()) matcher_.set_rings(find_rings(scan).source != RingSource::kNone);
+  if (!matcher_.has_map()) matcher_.set_rings(find_rings(scan).elevations_rad.size());
   OdometryStep step;
   step.motion = T_previous_lidar && follows(stamp_s) ? twist_of(*T_previous_lidar, stamp_s - last_stamp_s_)
                                                      : matcher_.predicted_motion(stamp_s);

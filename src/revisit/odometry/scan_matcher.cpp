@@ -31,6 +31,10 @@ struct Matching {
   static constexpr double kLeastSeen = 1e-3;  ///< a point in a thousand that faces a direction (IcpOptions)
   static constexpr double kSteady_m = 0.02;   ///< rocking between two voxels counts as converged
   static constexpr double kNoise_m = 0.03;    ///< of points, where patches count by their variance
+  // What faces the axis of rings, to within so much, fixes nothing across it. The lines of few rings lie on no surface
+  // together: in crowns their planes lean as the beams do.
+  static constexpr double kLevel_deg = 8.0, kLevelOfFew_deg = 20.0;
+  static constexpr std::uint32_t kFewRings = 32;
   static constexpr double kFineVoxels = 0.3, kFine_m = 0.1;  ///< narrowest kernel: so many voxels and so much more
   static constexpr double kTurnsTried_deg[] = {0.0, 5.0, -5.0, 10.0, -10.0};  ///< where the prediction failed
   static constexpr double kFastestTurn_degps = 300.0, kTurnStep_deg = 15.0;   ///< since the last scan that was tracked
@@ -53,6 +57,11 @@ struct Matching {
   static constexpr double kLongestGap_s = 1.0;  ///< beyond, the motion before says nothing about the motion now
   static constexpr double kLongestExtrapolation_s = 5.0;  ///< and is still a better guess than none
 };
+
+double level_deg(std::uint32_t rings) {
+  if (rings == 0) return 0.0;
+  return rings <= Matching::kFewRings ? Matching::kLevelOfFew_deg : Matching::kLevel_deg;
+}
 
 double median_range_m(std::span<const Point> points) {
   std::vector<float> ranges;
@@ -171,8 +180,8 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
                                .least_reach_m = map_->voxel_m(),
                                .settled_m = Matching::kSettled_m,
                                .least_seen = Matching::kLeastSeen,
-                               .has_rings = has_rings_,
-                               .noise_m = has_rings_ ? Matching::kNoise_m : 0.0});
+                               .level_deg = level_deg(rings_),
+                               .noise_m = rings_ > 0 ? Matching::kNoise_m : 0.0});
     icp.converged = icp.converged || (icp.information(0, 0) > 0.0 && icp.last_step_m < Matching::kSteady_m);
     return icp;
   };

@@ -45,10 +45,10 @@ class ScanMatcher {
   ScanMatcher(ScanMatcher&&) noexcept;
   ScanMatcher& operator=(ScanMatcher&&) noexcept;
 
-  /// Whether the beams turn in rings; not, until told. Such lines stand still in the sensor's frame, and the patches
+  /// In how many rings the beams turn; none, until told. Such lines stand still in the sensor's frame, and the patches
   /// that one scan's lines make of leaves would hold back its tilt: what is uncertain then counts for less. A sparse
   /// pattern that does not repeat needs all that it meets.
-  void set_rings(bool has_rings) { has_rings_ = has_rings; }
+  void set_rings(std::size_t rings) { rings_ = static_cast<std::uint32_t>(rings); }
 
   /// The predicted motion during the coming scan, where it follows closely on the last.
   std::optional<Twist> predicted_motion(double stamp_s) const;
@@ -81,7 +81,7 @@ class ScanMatcher {
     if (has_map && !map_) map_ = std::make_unique<LocalMap>(1.0, 1.0);  // of whatever size the archive says
     if (has_map) fields(*map_);
     fields(T_odom_lidar_, motion_, forgotten_from_, last_stamp_s_, range_m_, untracked_m_, T_odom_tracked_,
-           tracked_stamp_s_, squared_prediction_error_m2_, typical_match_, scans_, has_rings_, last_view_);
+           tracked_stamp_s_, squared_prediction_error_m2_, typical_match_, scans_, rings_, last_view_);
   }
 
   bool has_map() const { return map_ != nullptr; }
@@ -107,7 +107,7 @@ class ScanMatcher {
   double squared_prediction_error_m2_ = 0.0;  ///< running mean
   double typical_match_ = 0.0;                ///< running mean of the share that met the map
   int scans_ = 0;                             ///< in the map
-  bool has_rings_ = false;
+  std::uint32_t rings_ = 0;
   LastView last_view_;  ///< of the last scan that was tracked
 };
 

@@ -177,7 +177,7 @@ TEST(ScanMatcher, AStartInMotionAmongFewThingsIsNoStandstill) {
   for (const unsigned seed : {10u, 33u, 55u}) {
     const SyntheticWorld world(seed, 60.0, 10);
     ScanMatcher matcher;
-    matcher.set_rings(true);
+    matcher.set_rings(16);
     ScanMatch step;
     for (int i = 0; i < kScans; ++i) {
       const Scan scan =

@@ -231,6 +231,7 @@ TEST(LoopGate, KnowsItsKeyframes) {
   LoopGate gate = gate_of_two_visits();
   EXPECT_TRUE(gate.offer(loop(1010, 10, 0.2)).empty());
   EXPECT_THROW(gate.offer(loop(5000, 10, 0.2)), std::invalid_argument);
+  EXPECT_THROW(gate.offer(loop(500, 10, 0.2)), std::invalid_argument) << "between two that are there";
   EXPECT_THROW(gate.add_keyframe({3}, TrajectoryPoint{}), std::invalid_argument);
 }
 

@@ -26,7 +26,6 @@ struct Steps {
   static constexpr double kAcross = 1e-3;      ///< covariance across a plane, 1 along it (Segal et al., RSS 2009)
   static constexpr double kArm_m = 10.0;       ///< at which turns are weighed against translations
   static constexpr int kMostTilts = 10;        ///< steps of height and tilt alone
-  static constexpr double kAlongAxis = 0.94;   ///< cosine between a normal and the source's z axis: within 20 degrees
   // Points share the errors of the surfaces that they lie on, so that they count for fewer than they are.
   static constexpr double kPointsThatCountAsOne = 10.0, kLeastNoise_m = 0.02;
 };
@@ -104,11 +103,10 @@ double share_of(const Surface::Patch& patch, double noise_m) {
 // The direction along which a patch fixes the pose. Rings of beams on level ground stand still in the sensor's frame,
 // and the noise in the normals of their patches would hold the sensor back: what faces along the rings' axis fixes
 // nothing across it.
-Eigen::Vector3d fixed_by(const Eigen::Vector3d& normal, const Pose& T, bool has_rings) {
+Eigen::Vector3d fixed_by(const Eigen::Vector3d& normal, const Pose& T, double least_cosine) {
   const Eigen::Vector3d z_axis = T.linear().col(2);
   const double cosine = normal.dot(z_axis);
-  return has_rings && std::abs(cosine) > Steps::kAlongAxis ? Eigen::Vector3d(std::copysign(1.0, cosine) * z_axis)
-                                                           : normal;
+  return std::abs(cosine) > least_cosine ? Eigen::Vector3d(std::copysign(1.0, cosine) * z_axis) : normal;
 }
 
 // Points [begin, end) of the source in steps of `stride`, at kernel width `width_m`.
@@ -116,6 +114,8 @@ Equations equations_of(const Surface& target, Points source, const IcpOptions& o
                        std::size_t end, std::size_t stride, double width_m, double noise_m, const Pose& T, Met& met) {
   const Points source_normals = options.source_normals;
   const double reach_m = std::max(width_m, options.least_reach_m);
+  const double least_cosine =
+      options.level_deg > 0.0 ? std::cos(to_radians(options.level_deg)) : std::numeric_limits<double>::infinity();
   Equations sum;
   const auto reach2 = static_cast<float>(reach_m * reach_m);
   const double shrink = width_m * width_m / 4.0;
@@ -126,7 +126,7 @@ Equations equations_of(const Surface& target, Points source, const IcpOptions& o
     const Eigen::Vector3d n = patch->normal.cast<double>(), d = p - patch->point.cast<double>();
     if (n.squaredNorm() < 0.5) continue;
     if (source_normals.empty()) {
-      const Eigen::Vector3d along = fixed_by(n, T, options.has_rings);
+      const Eigen::Vector3d along = fixed_by(n, T, least_cosine);
       Vector6 J;
       J << along, (p - T.translation()).cross(along);
       const double residual = n.dot(d);

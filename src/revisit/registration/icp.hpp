@@ -34,9 +34,9 @@ struct IcpOptions {
   /// Directions in which the surfaces' normals have on average a smaller square share than this stay as guessed: along
   /// a bare corridor normals are noise. Turns count as the motion of a point 10 m away.
   double least_seen = 0.0;
-  /// Point-to-plane: the source was seen by rings of beams about its z axis. Patches that face along that axis, to
-  /// within 20 degrees, then fix nothing across it.
-  bool has_rings = false;
+  /// Point-to-plane, of a source that was seen by rings of beams about its z axis: patches that face along that axis,
+  /// to within so many degrees, fix nothing across it. 0: all fix what they face.
+  double level_deg = 0.0;
   /// Point-to-plane, where above 0: once settled, height, roll and pitch along the source's axes settle again with each
   /// pair weighed by the noise of points (this, a standard deviation) and the variance of its patch. Only they: along
   /// the ground a lorry beside is as certain as any wall.

@@ -176,13 +176,13 @@ TEST(Icp, RingsOnTheGroundDoNotHoldTheSensorBack) {
   for (int i = 0; i < 4000; ++i)
     points.emplace_back(static_cast<float>(i % 20 - 10), 0.05f * static_cast<float>(i / 20) - 5.f, 0.f);
   for (int i = 0; i < 40; ++i) points.emplace_back(19.7f, 0.5f * static_cast<float>(i) - 10.f, 1.f);  // 0.3 m before it
-  const auto align = [&](float lean, bool has_rings) {
+  const auto align = [&](float lean, double level_deg) {
     return align_icp(RippledGroundAndWall(lean), points, Pose::Identity(),
-                     {.coarse_m = 1.0, .least_seen = 1e-3, .has_rings = has_rings});
+                     {.coarse_m = 1.0, .least_seen = 1e-3, .level_deg = level_deg});
   };
   for (const float lean : {0.1f, 0.3f}) {  // 6 and 17 degrees: of ground, and of crowns
-    EXPECT_LT(align(lean, false).T_target_source.translation().x(), 0.25) << "the ripples hold it back: " << lean;
-    const IcpResult found = align(lean, true);
+    EXPECT_LT(align(lean, 0.0).T_target_source.translation().x(), 0.25) << "the ripples hold it back: " << lean;
+    const IcpResult found = align(lean, 20.0);
     EXPECT_NEAR(found.T_target_source.translation().x(), 0.3, 0.01) << lean;
     EXPECT_GT(found.matched, 0.75);
     EXPECT_NEAR(found.matched_sideways, 0.01, 0.005) << "the wall's share";
