@@ -90,6 +90,25 @@ TEST(Earth, FewFixesPlaceNothing) {
   EXPECT_FALSE((*placed)[0]);
 }
 
+// A straight way, whose fixes tell its heading and not how it leans.
+TEST(Earth, AStraightWayStaysUpright) {
+  for (const double yaw_rad : {0.5, -2.0}) {
+    Drive drive(0.0);
+    drive.parts.resize(80);
+    drive.truth.resize(80);
+    PoseGraph straight;
+    for (std::size_t i = 0; i < 80; ++i) straight.add_node(at(0, 0, 0.7) * drive.graph.nodes()[i]);
+    for (std::size_t i = 0; i + 1 < 80; ++i) straight.add_edge(drive.graph.edges()[i]);
+    const Pose T_earth_truth = at(300.0, 50.0, yaw_rad);
+    const auto placed = settle_on_earth(straight, fixes(drive, T_earth_truth, 0), drive.parts);
+    ASSERT_TRUE(placed) << placed.error().message;
+    ASSERT_TRUE((*placed)[0]);
+    const Pose error = T_earth_truth.inverse() * *(*placed)[0] * straight.nodes()[0];
+    EXPECT_LT(error.translation().norm(), 0.5);
+    EXPECT_LT(to_degrees(rotation_angle(error)), 1.0);
+  }
+}
+
 // Parts that nothing joins lie on the earth each by its own fixes.
 TEST(Earth, PartsArePlacedEachByItsOwnFixes) {
   Drive drive(0.0);

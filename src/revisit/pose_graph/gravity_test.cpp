@@ -89,13 +89,13 @@ TEST(Gravity, WrongReadingsLoseTheirWeight) {
 // Readings with noise of 0.3 degrees, along a drive whose pitch drifts evenly by so much from one to the next, in each
 // half anew if it turns back. An edge across a gap, which knows next to nothing, is no step.
 double deviation_deg(std::size_t count, double drift_deg, double step_between_halves_deg, unsigned seed,
-                     bool turns_back = false) {
+                     bool turns_back = false, double edges_deg = 0.05) {
   PoseGraph graph;
   std::vector<UpReading> readings;
   std::mt19937 random(seed);
   std::normal_distribution<double> noise(0.0, to_radians(0.3));
   Matrix6 information = Matrix6::Identity();
-  information.diagonal().tail<3>().setConstant(std::pow(to_radians(0.05), -2));
+  information.diagonal().tail<3>().setConstant(std::pow(to_radians(edges_deg), -2));
   for (std::size_t i = 0; i < count; ++i) {
     const bool is_second = step_between_halves_deg > 0.0 && i >= count / 2;
     Pose T = Pose::Identity();
@@ -124,6 +124,13 @@ TEST(Gravity, ADriftThatComesBackIsSeenByQuarters) {
   const double deviation = deviation_deg(400, 0.1, 0.0, 3, true);
   EXPECT_GT(deviation, 0.2);
   EXPECT_LT(deviation, 0.6);
+}
+
+// Where edges say that the graph drifts by more than it does, readings count for less by as much.
+TEST(Gravity, CountsLessWhereTheGraphDriftsLessThanItsEdgesSay) {
+  const double as_said = deviation_deg(400, 0.1, 0.0, 3), more_is_said = deviation_deg(400, 0.1, 0.0, 3, false, 5.0);
+  EXPECT_GT(more_is_said, 3.0 * as_said);
+  EXPECT_LT(more_is_said, 10.0);
 }
 
 TEST(Gravity, PartsThatLieTiltedToEachOtherDoNotDrift) { EXPECT_GT(deviation_deg(120, 0.0, 4.0, 4), 3.0); }
