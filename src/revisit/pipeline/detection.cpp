@@ -1,10 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/pipeline/detection.hpp>
 
+#include <algorithm>
+
 #include <revisit/core/refusal_text.hpp>
 #include <revisit/core/text.hpp>
 
 namespace revisit {
+
+const Detection::Registered* Detection::likeliest() const {
+  const auto best = std::max_element(
+      registered.begin(), registered.end(),
+      [](const Registered& a, const Registered& b) { return a.evidence.own_log_odds < b.evidence.own_log_odds; });
+  return best == registered.end() ? nullptr : &*best;
+}
 
 std::string Detection::reason() const {
   if (!refusal) return {};

@@ -28,6 +28,7 @@ struct Detection {
     GeometricEvidence evidence;
   };
   std::vector<Registered> registered;             ///< every place that was registered, accepted or not
+  bool tried_further = false;                     ///< LoopVerification::has_tried_further()
   std::optional<LoopConstraint> loop;             ///< set where the answer was accepted
   double score = 0.0;                             ///< orders answers by confidence (docs/method.md, section 7)
   std::optional<Refusal> refusal;                 ///< why there is no loop; absent where there is one
@@ -41,6 +42,8 @@ struct Detection {
   PreparedScan::Milliseconds preparation_ms;
   double odometry_ms = 0.0, search_ms = 0.0, temporal_ms = 0.0, geometric_ms = 0.0;
 
+  /// Of the poses that were registered the one with the highest log odds by its own evidence; null where there is none.
+  const Registered* likeliest() const;
   /// The refusal in words, with the evidence behind it; empty where there is a loop.
   std::string reason() const;
   /// All that were found with this scan: its own, and those of earlier scans.

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <revisit/registration/sweep_motion.hpp>
@@ -14,23 +13,10 @@
 namespace revisit {
 namespace {
 
-struct Nearby {
-  static constexpr double kWorthwhile_log_odds = -4.0;
-  static constexpr std::size_t kPlaces = 4;
-  static constexpr double kSame_m = 1.0;  ///< the same pose
-};
-
 struct Moving {
   static constexpr double kHopeless_log_odds = -15.0, kCertain_log_odds = 9.0;
   static constexpr double kStill_m = 0.1, kArm_m = 10.0;  ///< within a sweep; a turn counts at this distance
 };
-
-double highest_log_odds(const Detection& detection) {
-  double highest = -std::numeric_limits<double>::infinity();
-  for (const Detection::Registered& each : detection.registered)
-    highest = std::max(highest, each.evidence.own_log_odds);
-  return highest;
-}
 
 }  // namespace
 
@@ -108,13 +94,19 @@ Result<Localisation> Localiser::locate(Scan scan) {
     // Once more, without what the motion did to it. The surer answer counts, as poses or as refusals do.
     auto undistorted = preparation_.prepare(std::move(scan), **motion);
     if (undistorted) {
-      auto again = recognition_.find(*undistorted, places(), typical_);
+      auto again = recognition_.find(*undistorted, places(), typical_, true);
       if (!again) return again.error();
-      if (highest_log_odds(*again) > highest_log_odds(*detection)) {
+      const Detection::Registered *const likeliest = detection->likeliest(), *const now = again->likeliest();
+      if (now != nullptr && now->evidence.own_log_odds > likeliest->evidence.own_log_odds) {
         detection = std::move(again);
         prepared = std::move(undistorted);
       }
     }
+  }
+  // Before places are believed together that are not enough alone: what else looks like the scan?
+  if (!detection->loop && !detection->tried_further) {
+    detection = recognition_.find(*prepared, places(), typical_, true);
+    if (!detection) return detection.error();
   }
   if (const Status looked = look_nearby(*prepared, *detection); !looked) return looked.error();
   ask_for_more_views(*detection);
@@ -129,12 +121,10 @@ Result<Localisation> Localiser::locate(Scan scan) {
 // How the sensor moved during a sweep that nobody followed, as the best place that was tried shows it. Nothing where
 // the scan is certain as it is, fits nowhere, or hardly moved.
 Result<std::optional<Twist>> Localiser::motion_of(const PreparedScan& scan, const Detection& detection) const {
-  const double log_odds = highest_log_odds(detection);
-  if (scan.scan.times_s.empty() || log_odds < Moving::kHopeless_log_odds || log_odds > Moving::kCertain_log_odds)
+  const Detection::Registered* const best = detection.likeliest();
+  if (scan.scan.times_s.empty() || best == nullptr || best->evidence.own_log_odds < Moving::kHopeless_log_odds ||
+      best->evidence.own_log_odds > Moving::kCertain_log_odds)
     return std::optional<Twist>();
-  const auto best =
-      std::max_element(detection.registered.begin(), detection.registered.end(),
-                       [](const auto& a, const auto& b) { return a.evidence.own_log_odds < b.evidence.own_log_odds; });
   const auto place = recognition_.geometry(best->match);
   if (!place) return place.error();
   const auto found = find_sweep_motion((*place)->surface(), scan.scan, best->evidence.T_match_query,
@@ -146,51 +136,6 @@ Result<std::optional<Twist>> Localiser::motion_of(const PreparedScan& scan, cons
       sweep_s * (found->motion.linear_mps.norm() + Moving::kArm_m * found->motion.angular_radps.norm()) <
       Moving::kStill_m;
   return is_still ? std::optional<Twist>() : std::optional(found->motion);
-}
-
-std::vector<PosePrediction> Localiser::nearest_places(const Pose& T_map_lidar, int part, std::size_t count) const {
-  std::vector<std::pair<double, const StoredMapPose*>> nearest;
-  for (const StoredMapPose& each : map_.poses()) {
-    const double distance_m2 = (each.T_map_lidar.translation() - T_map_lidar.translation()).squaredNorm();
-    if (each.part != part || distance_m2 >= std::pow(kFarFromPlaces_m, 2)) continue;
-    if (nearest.size() == count && distance_m2 >= nearest.back().first) continue;
-    if (nearest.size() == count) nearest.pop_back();
-    nearest.insert(std::upper_bound(nearest.begin(), nearest.end(), std::pair(distance_m2, &each)),
-                   {distance_m2, &each});
-  }
-  std::vector<PosePrediction> predictions;
-  predictions.reserve(nearest.size());
-  for (const auto& [distance_m2, place] : nearest)
-    predictions.push_back({place->keyframe, place->T_map_lidar.inverse() * T_map_lidar, 0.0});
-  return predictions;
-}
-
-// What is nearer shows more of the same: a pose that no place tried so far makes certain may be certain from one
-// beside.
-Status Localiser::look_nearby(const PreparedScan& scan, Detection& detection) {
-  if (detection.loop || highest_log_odds(detection) < Nearby::kWorthwhile_log_odds) return ok();
-  const auto best =
-      std::max_element(detection.registered.begin(), detection.registered.end(),
-                       [](const auto& a, const auto& b) { return a.evidence.own_log_odds < b.evidence.own_log_odds; });
-  const Pose T_map_lidar = map_.T_map_lidar(best->match) * best->evidence.T_match_query;
-  for (const PosePrediction& each : nearest_places(T_map_lidar, map_.part(best->match), Nearby::kPlaces)) {
-    const bool is_tried = std::any_of(detection.registered.begin(), detection.registered.end(),
-                                      [&](const auto& other) { return other.match == each.match; });
-    if (is_tried || detection.loop) continue;
-    const auto tested = recognition_.test(scan, each, typical_);
-    if (!tested) return tested.error();
-    if (!tested->geometric) continue;
-    const GeometricEvidence& found = *tested->geometric;
-    detection.registered.push_back({each.match, found});
-    if (!tested->is_accepted() ||
-        (each.T_match_query.inverse() * found.T_match_query).translation().norm() > Nearby::kSame_m)
-      continue;
-    detection.loop =
-        LoopConstraint{detection.frame,       each.match,        found.T_match_query, found.evidence.inlier_ratio,
-                       found.evidence.rmse_m, found.probability, tested->score(),     found.information};
-    detection.refusal.reset();
-  }
-  return ok();
 }
 
 void Localiser::set_verification(const Parameters& parameters) {

@@ -74,6 +74,8 @@ class Localiser {
   /// metres.
   bool is_sure(const PoseBelief::Hypothesis& best) const;
   Status look_nearby(const PreparedScan& scan, Detection& detection);
+  void accept_together(Detection& detection) const;
+  static void accept(Detection& detection, FrameId match, const GeometricEvidence& found, double score);
   Status look_where_expected(const PreparedScan& scan, const TrajectoryPoint& point, Detection& detection);
   /// What it is worth to be where somebody expects it: as much as there is elsewhere.
   double expectation_log_odds(const Pose& T_map_lidar, int part, const TrajectoryPoint& point) const;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -115,6 +116,27 @@ TEST(Localiser, OneScanAnswersFromTheMapOfAnEarlierRun) {
   ASSERT_TRUE(elsewhere);
   EXPECT_FALSE(elsewhere->T_map_lidar);
   EXPECT_FALSE(elsewhere->detection.reason().empty());
+}
+
+// Asked to be surer than any one place makes it, of scans whose points are some 0.2 m off.
+TEST(Localiser, PlacesSideBySideAnswerTogether) {
+  Parameters parameters;
+  parameters.geometric.min_probability = 1.0 - 1e-10;
+  auto localiser = Localiser::open(small_map(), parameters);
+  ASSERT_TRUE(localiser) << localiser.error().message;
+  std::mt19937 random(3);
+  std::normal_distribution<float> off(0.0f, 0.12f);
+  for (int i = 8; i < 42; i += 8) {
+    const Pose T_here_query = planar_pose(0.3, 0.5, 0.4);
+    Scan scan = town().scan(pose_at(i) * T_here_query, kSensor, static_cast<unsigned>(900 + i));
+    for (Point& p : scan.points) p.x += off(random), p.y += off(random), p.z += off(random);
+    const auto located = localiser->locate(std::move(scan));
+    ASSERT_TRUE(located && located->T_map_lidar) << i;
+    const Pose truth = pose_at(0).inverse() * pose_at(i) * T_here_query;
+    EXPECT_LT((truth.inverse() * *located->T_map_lidar).translation().norm(), 0.2) << i;
+    for (const auto& each : located->detection.registered)
+      EXPECT_LT(each.evidence.probability, parameters.geometric.min_probability) << i << ": enough by itself";
+  }
 }
 
 // The index lies in a finished map; one that a killed run left is put together.

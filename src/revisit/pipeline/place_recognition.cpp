@@ -16,8 +16,8 @@ constexpr std::size_t kLearnsEvery = 4;  // queries: how much alike places are c
 
 }  // namespace
 
-Result<Detection> PlaceRecognition::find(const PreparedScan& query, std::size_t places,
-                                         const TypicalAgreement& typical) {
+Result<Detection> PlaceRecognition::find(const PreparedScan& query, std::size_t places, const TypicalAgreement& typical,
+                                         bool is_thorough) {
   Detection detection;
   detection.frame = query.scan.frame;
   detection.searchable_places = places;
@@ -34,7 +34,7 @@ Result<Detection> PlaceRecognition::find(const PreparedScan& query, std::size_t 
   detection.search_ms = watch.lap_ms();
   if (detection.candidates.empty())
     detection.refusal = Refusal{places == 0 ? Refusal::Reason::kNoSearchablePast : Refusal::Reason::kNoCandidate};
-  if (const Status status = verify(query, typical, detection); !status) return status.error();
+  if (const Status status = verify(query, typical, is_thorough, detection); !status) return status.error();
 
   recent_queries_.push_back({detection.frame, query.descriptor});
   if (recent_queries_.size() > kTemporalPairs) recent_queries_.pop_front();
@@ -93,18 +93,21 @@ Result<std::shared_ptr<const ScanGeometry>> PlaceRecognition::geometry(FrameId p
   return geometry;
 }
 
-Status PlaceRecognition::verify(const PreparedScan& query, const TypicalAgreement& typical, Detection& detection) {
+Status PlaceRecognition::verify(const PreparedScan& query, const TypicalAgreement& typical, bool is_thorough,
+                                Detection& detection) {
   Stopwatch watch;
   const VerificationQuery question{query.scan.frame, query.descriptor, query.cloud, query.geometry,
                                    query.trajectory_point};
-  const VerificationContext context = this->context(
+  VerificationContext context = this->context(
       typical, following_, detection.candidates.empty() ? FrameId{} : index_.frame(detection.searchable_places - 1));
+  context.is_thorough = is_thorough;
   LoopVerification verification(context, question);
   if (queries_++ % kLearnsEvery == 0 && parameters_.geometric.overhead_search)
     if (const Status status = learn_look_alikes(query, verification.registration()); !status) return status;
   if (detection.candidates.empty()) return ok();
   auto answer = verification.verify(detection.candidates);
   if (!answer) return answer.error();
+  detection.tried_further = verification.has_tried_further();
   for (const Hypothesis& each : verification.hypotheses())
     if (each.geometric) detection.registered.push_back({each.candidate.match, *each.geometric});
   if (*answer) {

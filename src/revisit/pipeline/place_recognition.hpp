@@ -30,8 +30,10 @@ class PlaceRecognition {
   PlaceRecognition(const Parameters& parameters, std::unique_ptr<PlaceClouds> clouds, PlaceIndex index)
       : parameters_(parameters), index_(std::move(index)), clouds_(std::move(clouds)) {}
 
-  /// Looks for the scan among the first `places` of the index. An error where a place cannot be read.
-  Result<Detection> find(const PreparedScan& query, std::size_t places, const TypicalAgreement& typical);
+  /// Looks for the scan among the first `places` of the index, thoroughly if so asked (VerificationContext). An error
+  /// where a place cannot be read.
+  Result<Detection> find(const PreparedScan& query, std::size_t places, const TypicalAgreement& typical,
+                         bool is_thorough = false);
   /// Follows loops backwards, two scans a call: those of the last metres that had none when they came, and have one now
   /// (BackwardFollowing). `detection`: what find() said of the newest scan, at this point of the trajectory.
   Result<std::vector<Detection>> follow_back(const Detection& detection, const std::optional<TrajectoryPoint>& point,
@@ -87,7 +89,7 @@ class PlaceRecognition {
   VerificationContext context(const TypicalAgreement& typical, const LoopFollowing& following,
                               FrameId newest = {}) const;
   Result<std::vector<LoopCandidate>> candidates(const PreparedScan& query, std::size_t places) const;
-  Status verify(const PreparedScan& query, const TypicalAgreement& typical, Detection& detection);
+  Status verify(const PreparedScan& query, const TypicalAgreement& typical, bool is_thorough, Detection& detection);
   Status learn_look_alikes(const PreparedScan& query, CandidateRegistration& registration);
   Result<std::optional<Detection>> find_again(const BackwardFollowing::Query& query, const TypicalAgreement& typical);
   bool is_to_be_followed(const Detection& detection, const std::optional<TrajectoryPoint>& point) const;

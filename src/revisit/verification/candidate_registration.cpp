@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 
 #include <oneapi/tbb/parallel_for.h>
@@ -46,7 +47,7 @@ Result<Hypothesis> CandidateRegistration::open(const LoopCandidate& candidate) c
   return hypothesis;
 }
 
-Result<std::vector<Hypothesis>> CandidateRegistration::test(std::span<const LoopCandidate> candidates) {
+Result<std::vector<Hypothesis>> CandidateRegistration::open(std::span<const LoopCandidate> candidates) {
   std::vector<Hypothesis> hypotheses;
   std::optional<Hypothesis> elsewhere;  // the best of them
   for (const LoopCandidate& candidate : candidates) {
@@ -77,7 +78,20 @@ Result<std::vector<Hypothesis>> CandidateRegistration::test(std::span<const Loop
     std::stable_sort(hypotheses.begin(), hypotheses.end(),
                      [](const Hypothesis& a, const Hypothesis& b) { return a.overlap > b.overlap; });
   }
-  hypotheses.resize(std::min(hypotheses.size(), static_cast<std::size_t>(options_.candidates)));
+  return hypotheses;
+}
+
+Result<std::vector<Hypothesis>> CandidateRegistration::test(std::span<const LoopCandidate> candidates) {
+  auto opened = open(candidates);
+  if (!opened) return opened;
+  untested_ = *std::move(opened);
+  return test_next(static_cast<std::size_t>(options_.candidates));
+}
+
+std::vector<Hypothesis> CandidateRegistration::test_next(std::size_t count) {
+  const auto end = untested_.begin() + static_cast<std::ptrdiff_t>(std::min(count, untested_.size()));
+  std::vector<Hypothesis> hypotheses(std::move_iterator(untested_.begin()), std::move_iterator(end));
+  untested_.erase(untested_.begin(), end);
 
   Stopwatch watch;
   for (Hypothesis& each : hypotheses) check_temporal_consistency(each);

@@ -42,7 +42,9 @@ struct VerificationContext {
   TypicalAgreement typical;
   double look_alikes_log_odds = 0.0;  ///< LookAlikes
   FrameId newest;                     ///< place that may answer
-  bool is_one_drive = false;          ///< odometry lost track in between where it does not know how places lie
+  bool is_thorough = false;  ///< a scan alone is registered with further places unless it is found among the best ones;
+                             ///< else only where it speaks against all of these
+  bool is_one_drive = false;  ///< odometry lost track in between where it does not know how places lie
 };
 
 /// How one hypothesis about a query is tested: seen from overhead, then temporal consistency, then registration
@@ -54,6 +56,8 @@ class CandidateRegistration {
   /// The poses that fit best from overhead, two a candidate and at most `options.candidates`, registered where nothing
   /// refuses them before. An error where the cloud of a place cannot be read.
   Result<std::vector<Hypothesis>> test(std::span<const LoopCandidate> candidates);
+  /// The next best ones of those candidates, at most so many; for a scan whose place is not among the best.
+  std::vector<Hypothesis> test_next(std::size_t count);
   /// A place that the query is predicted to stand near to: only the pose is open, and little overlap is no objection,
   /// since something may stand in the way.
   Result<Hypothesis> test(const PosePrediction& prediction);
@@ -70,6 +74,8 @@ class CandidateRegistration {
 
  private:
   Result<Hypothesis> open(const LoopCandidate& candidate) const;
+  /// All poses of these candidates that may be registered, the best first.
+  Result<std::vector<Hypothesis>> open(std::span<const LoopCandidate> candidates);
   std::vector<Hypothesis> search_overhead(const Hypothesis& of_place, double yaw_reach_rad, std::size_t wanted);
   void share_geometry(std::span<Hypothesis> hypotheses) const;
   void check_temporal_consistency(Hypothesis& hypothesis) const;
@@ -83,6 +89,7 @@ class CandidateRegistration {
   const VerificationQuery& query_;
   OverheadSearch overhead_;
   std::shared_ptr<const ScanGeometry> query_geometry_;
+  std::vector<Hypothesis> untested_;  ///< of test(), the best first
   double temporal_ms_ = 0.0;
 };
 

@@ -18,6 +18,10 @@ struct NearerPlace {
   static constexpr double kDecides = 0.5;       ///< share of the answer's distance below which the nearer one decides
 };
 
+// Poses that are registered besides, where a scan alone fits none of the best: where places look alike, the right one
+// may come later (docs/maps.md, "Rows of like houses").
+constexpr std::size_t kFurther = 11;
+
 struct StandingOut {
   static constexpr double kFar_log_odds = 8.0;  ///< above the next one: nothing is like it
   static constexpr double kMostTrust = 0.8;     ///< share of the caution that it then takes away
@@ -35,6 +39,12 @@ Result<std::optional<Hypothesis>> LoopVerification::verify(std::span<const LoopC
   auto tested = registration_.test(candidates);
   if (!tested) return tested.error();
   hypotheses_ = *std::move(tested);
+  const auto is_enough = [&](const Hypothesis& each) {
+    return context_.is_thorough ? each.is_accepted() : each.geometric && each.own_log_odds() >= 0.0;
+  };
+  tried_further_ = !query_.trajectory_point && std::none_of(hypotheses_.begin(), hypotheses_.end(), is_enough);
+  if (tried_further_)
+    for (Hypothesis& each : registration_.test_next(kFurther)) hypotheses_.push_back(std::move(each));
   if (const auto& there = *predicted;
       there && std::none_of(hypotheses_.begin(), hypotheses_.end(),
                             [&](const Hypothesis& each) { return each.candidate.match == there->candidate.match; }))

@@ -23,6 +23,8 @@ class LoopVerification {
   Result<std::optional<Hypothesis>> verify_again(std::span<const RegisteredPose> registered);
   /// Everything that was tested.
   const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
+  /// Whether a scan alone was registered with places that fit less well from overhead, too.
+  bool has_tried_further() const { return tried_further_; }
   CandidateRegistration& registration() { return registration_; }
 
  private:
@@ -37,6 +39,7 @@ class LoopVerification {
   const VerificationQuery& query_;
   CandidateRegistration registration_;
   std::vector<Hypothesis> hypotheses_;
+  bool tried_further_ = false;
 };
 
 }  // namespace revisit

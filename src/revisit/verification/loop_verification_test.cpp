@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
+#include <random>
 #include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -177,6 +180,39 @@ TEST_F(LoopVerificationTest, TheLessAPoseStandsOutTheMoreCautionIsLeft) {
   ASSERT_LT(ahead, 7.5);
   EXPECT_NEAR(cautious.at(FrameId{2}), usual.at(FrameId{2}) - 2.0 * (1.0 - 0.8 * ahead / 8.0), 1e-6);
   EXPECT_NEAR(cautious.at(FrameId{80}), usual.at(FrameId{80}) - 2.0, 1e-6) << "it stands behind";
+}
+
+// From overhead two places look more like the scan than its own does: what stands there stands within a metre or so of
+// where it ought to.
+TEST_F(LoopVerificationTest, AScanAloneIsRegisteredWithFurtherPlacesWhereTheBestDoNotFit) {
+  const Pose T_world_query = SyntheticWorld::at(4.6, 0.9, 0.0);
+  const Described query = described(home_, T_world_query);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> off(-1.2f, 1.2f);
+  for (const int decoy : {71, 72}) {
+    Scan scan = home_.scan(T_world_query, {32, 900, -24.8, 5.0});
+    std::vector<std::uint8_t> ground;
+    for (Point& p : scan.points) {
+      ground.push_back(p.z < -1.6f);
+      p.x += off(random), p.y += off(random), p.z += off(random);
+    }
+    add(decoy, {describe(scan.points, {}), thin_for_registration(scan.points, ground)}, std::nullopt);
+  }
+  parameters_.geometric.candidates = 2;
+  const VerificationContext known = context();
+  for (const bool is_alone : {true, false}) {
+    const VerificationQuery question{FrameId{1000}, query.descriptor, query.cloud, nullptr,
+                                     is_alone ? std::nullopt : std::optional(TrajectoryPoint{.segment = 9})};
+    LoopVerification verification(known, question);
+    const auto answer = verification.verify(candidates(query, {71, 72, 0}));
+    ASSERT_TRUE(answer && *answer);
+    EXPECT_EQ((*answer)->is_accepted(), is_alone);
+    if (is_alone) {
+      EXPECT_LT((*answer)->candidate.match, FrameId{6});
+    } else {
+      EXPECT_EQ(verification.hypotheses().size(), 2u) << "on a drive the next scan comes soon";
+    }
+  }
 }
 
 TEST_F(LoopVerificationTest, APlaceThatCannotBeReadIsAnError) {

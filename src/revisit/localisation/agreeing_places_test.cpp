@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <revisit/localisation/agreeing_places.hpp>
+
+#include <gtest/gtest.h>
+
+namespace revisit {
+namespace {
+
+TEST(AgreeingPlaces, SayMoreThanOneAndLessThanAll) {
+  AgreeingPlaces places;
+  EXPECT_EQ(places.log_odds(), 0.0);
+  places.add(FrameId{7}, 1.0);
+  EXPECT_DOUBLE_EQ(places.log_odds(), 1.0);
+  places.add(FrameId{3}, 2.0);
+  EXPECT_DOUBLE_EQ(places.log_odds(), 2.5) << "the likeliest counts whole";
+  places.add(FrameId{9}, -1.0);
+  EXPECT_DOUBLE_EQ(places.log_odds(), 2.0) << "one that hardly shows the scan there speaks against it";
+  places.add(FrameId{4}, 1.0);
+  EXPECT_DOUBLE_EQ(places.log_odds(), 2.5);
+}
+
+TEST(AgreeingPlaces, TheFourLikeliestCount) {
+  AgreeingPlaces places;
+  for (int i = 0; i < 10; ++i) places.add(FrameId{i}, i < 4 ? 1.0 : -5.0);
+  EXPECT_DOUBLE_EQ(places.log_odds(), 2.5);
+}
+
+TEST(AgreeingPlaces, APlaceCountsOnce) {
+  AgreeingPlaces places;
+  for (const double log_odds : {1.0, 2.0, 0.5}) places.add(FrameId{5}, log_odds);
+  EXPECT_DOUBLE_EQ(places.log_odds(), 2.0);
+}
+
+// As likely at two poses, one of which was tried from one place alone: either may be right.
+TEST(AgreeingPlaces, AnotherPoseSpeaksAgainstIt) {
+  AgreeingPlaces places;
+  for (int i = 0; i < 4; ++i) places.add(FrameId{i}, 2.0);
+  EXPECT_DOUBLE_EQ(places.log_odds(), 5.0);
+  places.add_against(2.0);
+  EXPECT_NEAR(places.log_odds(), 0.0, 0.01);
+  const double before = places.log_odds();
+  places.add_against(-8.0);
+  EXPECT_NEAR(places.log_odds(), before, 1e-6) << "what is improbable says nothing";
+}
+
+}  // namespace
+}  // namespace revisit
