@@ -22,7 +22,7 @@ class AgreeingPlaces {
   /// not registered, said the same.
   void add_against(double log_odds);
 
-  /// That the pose is right and the others are wrong. Without a place, those of no evidence.
+  /// That the pose is right and the others are wrong; 0 without a place.
   double log_odds() const;
 
  private:

@@ -73,6 +73,8 @@ class Localiser {
   /// Whether scans in a row showed enough. In rooms as much as one scan that decides alone: look-alikes go on for
   /// metres.
   bool is_sure(const PoseBelief::Hypothesis& best) const;
+  /// Registers the scan with the places beside the likeliest pose, where that is not accepted: one of them may be
+  /// enough, or several together.
   Status look_nearby(const PreparedScan& scan, Detection& detection);
   void accept_together(Detection& detection) const;
   static void accept(Detection& detection, FrameId match, const GeometricEvidence& found, double score);

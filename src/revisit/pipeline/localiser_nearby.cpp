@@ -82,9 +82,7 @@ void Localiser::accept_together(Detection& detection) const {
 }
 
 void Localiser::accept(Detection& detection, FrameId match, const GeometricEvidence& found, double score) {
-  detection.loop = LoopConstraint{
-      detection.frame,   match, found.T_match_query, found.evidence.inlier_ratio, found.evidence.rmse_m,
-      found.probability, score, found.information,   found.own_log_odds,          found.evidence.in_the_open};
+  detection.loop = to_loop(detection.frame, match, found, score);
   detection.refusal.reset();
 }
 

@@ -153,11 +153,7 @@ void PlaceRecognition::answer(Hypothesis hypothesis, const ScanGeometry& query_g
   detection.score = hypothesis.score();
   if (hypothesis.is_accepted()) {
     refine(*hypothesis.geometric, *hypothesis.geometry, query_geometry);
-    const GeometricEvidence& found = *hypothesis.geometric;
-    detection.loop = LoopConstraint{
-        detection.frame,       hypothesis.candidate.match, found.T_match_query, found.evidence.inlier_ratio,
-        found.evidence.rmse_m, found.probability,          detection.score,     found.information,
-        found.own_log_odds,    found.evidence.in_the_open};
+    detection.loop = to_loop(detection.frame, hypothesis.candidate.match, *hypothesis.geometric, detection.score);
   }
   detection.answer = hypothesis.candidate;
   detection.temporal = hypothesis.temporal;

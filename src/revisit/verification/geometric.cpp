@@ -109,6 +109,19 @@ void refine(GeometricEvidence& found, const ScanGeometry& match, const ScanGeome
   found.information = icp.information;
 }
 
+LoopConstraint to_loop(FrameId query, FrameId match, const GeometricEvidence& found, double score) {
+  return {query,
+          match,
+          found.T_match_query,
+          found.evidence.inlier_ratio,
+          found.evidence.rmse_m,
+          found.probability,
+          score,
+          found.information,
+          found.own_log_odds,
+          found.evidence.in_the_open};
+}
+
 GeometricEvidence check_geometric(const ScanGeometry& match, const ScanGeometry& query, const CandidateView& view,
                                   const GeometricOptions& options) {
   std::optional<GeometricEvidence> best;

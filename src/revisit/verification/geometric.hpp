@@ -60,4 +60,7 @@ GeometricEvidence check_geometric(const ScanGeometry& match, const ScanGeometry&
 /// Makes the pose of what was accepted as exact as the scans allow: a quarter of the error with 16 lines.
 void refine(GeometricEvidence& found, const ScanGeometry& match, const ScanGeometry& query);
 
+/// What was found, as a constraint for the pose graph. `score` orders loops (Hypothesis::score()).
+LoopConstraint to_loop(FrameId query, FrameId match, const GeometricEvidence& found, double score);
+
 }  // namespace revisit

@@ -19,7 +19,7 @@ struct NearerPlace {
 };
 
 // Poses that are registered besides, where a scan alone fits none of the best: where places look alike, the right one
-// may come later (docs/maps.md, "Rows of like houses").
+// may come later (docs/maps.md, "Further places").
 constexpr std::size_t kFurther = 11;
 
 struct StandingOut {
