@@ -191,8 +191,7 @@ void CandidateRegistration::judge(Hypothesis& hypothesis, const PosePrediction* 
   const LoopEvidence& evidence = hypothesis.geometric->evidence;
   const double lost = evidence.in_the_open ? kUnknownInTheOpen_log_odds : kUnknownInRooms_log_odds;
   if (options_.follow)
-    support +=
-        odometry_log_odds(place, query_.trajectory_point, found, evidence.both_are_narrow, was_lost ? lost : 0.0);
+    support += odometry_log_odds(place, query_.trajectory_point, found, evidence, was_lost ? lost : 0.0);
   decide(*hypothesis.geometric, context_.look_alikes_log_odds, support, options_);
   if (options_.follow && hypothesis.geometric->is_consistent())
     hypothesis.geometric->refusal = refuse_heading(place, query_.trajectory_point, found);

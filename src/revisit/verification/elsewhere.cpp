@@ -14,9 +14,9 @@ struct Drift {
   static constexpr double kPose_m = 1.0;                            ///< of registered poses
   static constexpr double kDeviation_m = 0.5, kUsualShare = 0.005;  ///< what is usual
   static constexpr double kDeviationOfNarrow_m = 2.0;  ///< a narrow view that turns sees mostly what is new
-  static constexpr double kMostDeviations = 3.0;       ///< more is never off
-  static constexpr double kNever_log_odds = 20.0;
-  static constexpr double kShareToLearn = 0.03;
+  static constexpr double kMostDeviations = 3.0;       ///< more is a mistake of odometry that it did not notice
+  static constexpr double kMistakenShare = 0.03;       ///< of the motion, by which such mistakes are off
+  static constexpr double kMistaken_log_odds = 10.0, kNever_log_odds = 20.0;
   // Of the heading.
   static constexpr double kAlways_deg = 40.0, kDegreesAMetre = 0.02;
 };
@@ -53,14 +53,16 @@ std::optional<Refusal> refuse_heading(const std::optional<TrajectoryPoint>& plac
 }
 
 double odometry_log_odds(const std::optional<TrajectoryPoint>& place, const std::optional<TrajectoryPoint>& query,
-                         const Pose& T_place_query, bool both_are_narrow, double unknown_log_odds) {
+                         const Pose& T_place_query, const LoopEvidence& evidence, double unknown_log_odds) {
   if (!place || !query || place->origin != query->origin) return unknown_log_odds;
   const double off_m = (T_between(*place, *query).inverse() * T_place_query).translation().norm();
   const Apart apart(*place, *query);
-  const double always_m = both_are_narrow ? Drift::kDeviationOfNarrow_m : Drift::kDeviation_m;
-  const double deviation_m = std::hypot(always_m + Drift::kUsualShare * apart.motion_m, apart.gaps_m);
-  const double deviations = off_m / deviation_m;
-  return deviations > Drift::kMostDeviations ? -Drift::kNever_log_odds : -0.5 * deviations * deviations;
+  const double always_m = evidence.both_are_narrow ? Drift::kDeviationOfNarrow_m : Drift::kDeviation_m;
+  const double deviations = off_m / std::hypot(always_m + Drift::kUsualShare * apart.motion_m, apart.gaps_m);
+  if (deviations <= Drift::kMostDeviations) return -0.5 * deviations * deviations;
+  const bool may_be_mistaken =
+      evidence.in_the_open && !evidence.one_in_a_room && off_m <= always_m + apart.drift_m(Drift::kMistakenShare);
+  return may_be_mistaken ? -Drift::kMistaken_log_odds : -Drift::kNever_log_odds;
 }
 
 bool are_other_poses(const TrajectoryPoint& a, const Pose& T_a_query, const TrajectoryPoint& b, const Pose& T_b_query) {
@@ -74,7 +76,7 @@ std::vector<FrameId> places_elsewhere(const TrajectoryPoints& places, const Traj
   for (auto it = places.rbegin(); it != places.rend() && frames.size() < kMostPlaces; ++it) {
     if (!it->second || it->second->origin != point.origin) break;
     const Apart apart(*it->second, point);
-    if (apart.m > apart.most_m(Drift::kShareToLearn)) frames.push_back(it->first);
+    if (apart.m > apart.most_m(Drift::kMistakenShare)) frames.push_back(it->first);
   }
   return frames;
 }

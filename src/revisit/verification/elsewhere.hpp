@@ -8,6 +8,7 @@
 #include <revisit/core/refusal.hpp>
 #include <revisit/core/trajectory_point.hpp>
 #include <revisit/verification/loop_following.hpp>
+#include <revisit/verification/loop_probability.hpp>
 
 namespace revisit {
 
@@ -24,9 +25,11 @@ std::optional<Refusal> refuse_heading(const std::optional<TrajectoryPoint>& plac
 /// Log odds that odometry takes from a pose, 0 or less: those of a Gaussian whose deviation is 0.5 m (2 m where both
 /// views are narrow), half a per cent of the motion in between and what gaps brought; beyond three deviations so many
 /// that nothing makes up for them. Like houses in a row and the storeys of a building are told apart by nothing else.
-/// `unknown_log_odds` where odometry says nothing: it lost track in between, or one of the two has no point.
+/// In the open, up to 3 % of the motion, fewer: odometry may have made a mistake that it did not notice, and what is
+/// far surer than look-alikes are says so. `unknown_log_odds` where odometry says nothing: it lost track in between, or
+/// one of the two has no point.
 double odometry_log_odds(const std::optional<TrajectoryPoint>& place, const std::optional<TrajectoryPoint>& query,
-                         const Pose& T_place_query, bool both_are_narrow, double unknown_log_odds = 0.0);
+                         const Pose& T_place_query, const LoopEvidence& evidence, double unknown_log_odds = 0.0);
 
 /// Whether a query cannot stand at both poses at once, one found relative to place `a`, the other to `b`; false where
 /// odometry does not know how the places lie to each other.

@@ -9,6 +9,7 @@ namespace revisit {
 namespace {
 
 const TrajectoryPoint lost{.segment = 9, .origin = 9};
+const LoopEvidence around, narrow{.both_are_narrow = true};
 
 TEST(Elsewhere, IsWhatOdometryCannotBeWrongAbout) {
   const TrajectoryPoint place{.segment = 1, .origin = 1};
@@ -46,24 +47,38 @@ TEST(Elsewhere, IsWhatLooksTheSameTurned) {
 TEST(Elsewhere, IsTheLessLikelyTheFartherOdometryIs) {
   const TrajectoryPoint place{.segment = 1, .origin = 1};
   const TrajectoryPoint query = place.after(planar_pose(500.0, 0.0, 0.0));  // a deviation of 3 m
-  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, planar_pose(500.0, 0.0, 0.0), false), 0.0);
-  EXPECT_NEAR(odometry_log_odds(place, query, planar_pose(497.0, 0.0, 0.0), false), -0.5, 1e-9);
-  EXPECT_NEAR(odometry_log_odds(place, query, planar_pose(494.0, 0.0, 0.0), false), -2.0, 1e-9);
-  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, planar_pose(490.5, 0.0, 0.0), false), -20.0)
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, planar_pose(500.0, 0.0, 0.0), around), 0.0);
+  EXPECT_NEAR(odometry_log_odds(place, query, planar_pose(497.0, 0.0, 0.0), around), -0.5, 1e-9);
+  EXPECT_NEAR(odometry_log_odds(place, query, planar_pose(494.0, 0.0, 0.0), around), -2.0, 1e-9);
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, planar_pose(490.5, 0.0, 0.0), around), -10.0)
       << "more than three of them";
-  EXPECT_NEAR(odometry_log_odds(place, query, planar_pose(495.5, 0.0, 0.0), true), -0.5, 1e-9) << "of a sector: 4.5 m";
-  EXPECT_DOUBLE_EQ(odometry_log_odds(place, lost, planar_pose(0.0, 0.0, 0.0), false), 0.0);
-  EXPECT_DOUBLE_EQ(odometry_log_odds(place, lost, planar_pose(0.0, 0.0, 0.0), false, -3.0), -3.0);
-  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, planar_pose(500.0, 0.0, 0.0), false, -3.0), 0.0);
-  EXPECT_DOUBLE_EQ(odometry_log_odds(place, std::nullopt, planar_pose(0.0, 0.0, 0.0), false, -3.0), -3.0)
+  EXPECT_NEAR(odometry_log_odds(place, query, planar_pose(495.5, 0.0, 0.0), narrow), -0.5, 1e-9)
+      << "of a sector: 4.5 m";
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, lost, planar_pose(0.0, 0.0, 0.0), around), 0.0);
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, lost, planar_pose(0.0, 0.0, 0.0), around, -3.0), -3.0);
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, planar_pose(500.0, 0.0, 0.0), around, -3.0), 0.0);
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, std::nullopt, planar_pose(0.0, 0.0, 0.0), around, -3.0), -3.0)
       << "a scan alone";
+}
+
+TEST(Elsewhere, IsConceivableInTheOpenWhereOdometryMadeAMistake) {
+  const TrajectoryPoint place{.segment = 1, .origin = 1};
+  const TrajectoryPoint query = place.after(planar_pose(500.0, 0.0, 0.0));
+  const Pose off = planar_pose(484.6, 0.0, 0.0), far_off = planar_pose(484.4, 0.0, 0.0);
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, off, around), -10.0) << "3 % of 500 m, and 0.5 m";
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, far_off, around), -20.0);
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, off, {.in_the_open = false}), -20.0) << "rooms resemble one another";
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, off, {.one_in_a_room = true}), -20.0);
+  const TrajectoryPoint soon = place.after(planar_pose(20.0, 0.0, 0.0));
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, soon, planar_pose(17.0, 0.0, 0.0), around), -20.0)
+      << "3 m after 20 m: the next house";
 }
 
 TEST(Elsewhere, WhatGapsAreOffAddsUpAsTheirVariances) {
   const TrajectoryPoint place{.segment = 1, .origin = 1};
   TrajectoryPoint query = place;
   for (int gap = 0; gap < 9; ++gap) query = query.after_gap(Pose::Identity(), 0.5);
-  EXPECT_NEAR(odometry_log_odds(place, query, planar_pose(std::sqrt(2.5), 0.0, 0.0), false), -0.5, 1e-9)
+  EXPECT_NEAR(odometry_log_odds(place, query, planar_pose(std::sqrt(2.5), 0.0, 0.0), around), -0.5, 1e-9)
       << "0.5 m, and 1.5 m of nine gaps";
 }
 
