@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <limits>
 #include <map>
 
 #include <revisit/core/ids.hpp>
@@ -22,12 +24,15 @@ class AgreeingPlaces {
   /// not registered, said the same.
   void add_against(double log_odds);
 
-  /// That the pose is right and the others are wrong; 0 without a place.
+  /// That the pose is right and the others are wrong; 0 without a place. More where others were tried and none comes
+  /// near: then nothing in the map looks like it.
   double log_odds() const;
 
  private:
   std::map<FrameId, double> of_place_;
   double against_ = 0.0;  ///< odds
+  std::size_t others_ = 0;
+  double likeliest_other_ = -std::numeric_limits<double>::infinity();  ///< log odds
 };
 
 }  // namespace revisit

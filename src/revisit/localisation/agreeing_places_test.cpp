@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/localisation/agreeing_places.hpp>
 
+#include <utility>
+
 #include <gtest/gtest.h>
 
 namespace revisit {
@@ -41,6 +43,26 @@ TEST(AgreeingPlaces, AnotherPoseSpeaksAgainstIt) {
   const double before = places.log_odds();
   places.add_against(-8.0);
   EXPECT_NEAR(places.log_odds(), before, 1e-6) << "what is improbable says nothing";
+}
+
+TEST(AgreeingPlaces, APoseThatStandsOutAmongSeveralIsTrustedMore) {
+  AgreeingPlaces places;
+  places.add(FrameId{1}, 1.0);
+  places.add(FrameId{2}, 0.0);
+  for (int i = 0; i < 5; ++i) places.add_against(-20.0);
+  EXPECT_NEAR(places.log_odds(), 1.0, 1e-6) << "five others are too few";
+  places.add_against(-30.0);
+  EXPECT_NEAR(places.log_odds(), 3.5, 1e-6);
+  for (const auto& [other, more] : {std::pair{-11.0, 2.5}, {-9.0, 1.25}, {-7.0, 0.0}, {-30.0, 0.0}}) {
+    places.add_against(other);
+    EXPECT_NEAR(places.log_odds(), 1.0 + more, 1e-6) << "the likeliest of the others counts: " << other;
+  }
+}
+
+TEST(AgreeingPlaces, SayNothingWithoutAPlace) {
+  AgreeingPlaces places;
+  for (int i = 0; i < 6; ++i) places.add_against(1.0);
+  EXPECT_EQ(places.log_odds(), 0.0);
 }
 
 }  // namespace

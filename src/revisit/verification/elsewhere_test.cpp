@@ -9,7 +9,13 @@ namespace revisit {
 namespace {
 
 const TrajectoryPoint lost{.segment = 9, .origin = 9};
-const LoopEvidence around, narrow{.both_are_narrow = true};
+LoopEvidence with(bool LoopEvidence::*what, bool is_so) {
+  LoopEvidence evidence;
+  evidence.*what = is_so;
+  return evidence;
+}
+
+const LoopEvidence around, narrow = with(&LoopEvidence::both_are_narrow, true);
 
 TEST(Elsewhere, IsWhatOdometryCannotBeWrongAbout) {
   const TrajectoryPoint place{.segment = 1, .origin = 1};
@@ -67,8 +73,9 @@ TEST(Elsewhere, IsConceivableInTheOpenWhereOdometryMadeAMistake) {
   const Pose off = planar_pose(484.6, 0.0, 0.0), far_off = planar_pose(484.4, 0.0, 0.0);
   EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, off, around), -10.0) << "3 % of 500 m, and 0.5 m";
   EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, far_off, around), -20.0);
-  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, off, {.in_the_open = false}), -20.0) << "rooms resemble one another";
-  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, off, {.one_in_a_room = true}), -20.0);
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, off, with(&LoopEvidence::in_the_open, false)), -20.0)
+      << "rooms resemble one another";
+  EXPECT_DOUBLE_EQ(odometry_log_odds(place, query, off, with(&LoopEvidence::one_in_a_room, true)), -20.0);
   const TrajectoryPoint soon = place.after(planar_pose(20.0, 0.0, 0.0));
   EXPECT_DOUBLE_EQ(odometry_log_odds(place, soon, planar_pose(17.0, 0.0, 0.0), around), -20.0)
       << "3 m after 20 m: the next house";
