@@ -12,6 +12,18 @@
 
 namespace revisit {
 
+double seen_share(const DescriptorView& descriptor) {
+  const auto rows = static_cast<std::size_t>(descriptor.rows()), sectors = static_cast<std::size_t>(descriptor.sectors);
+  std::size_t seen = 0;
+  for (std::size_t sector = 0; sector < sectors; ++sector)
+    for (std::size_t bit = sector * rows; bit < (sector + 1) * rows; ++bit)
+      if ((descriptor.occupancy[bit / 64] >> (bit % 64) & 1u) != 0) {
+        ++seen;
+        break;
+      }
+  return sectors == 0 ? 0.0 : static_cast<double>(seen) / static_cast<double>(sectors);
+}
+
 int IntensityScanContext::occupied_cells() const {
   int count = 0;
   for (const std::uint64_t word : occupancy) count += std::popcount(word);

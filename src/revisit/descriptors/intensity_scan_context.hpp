@@ -61,6 +61,9 @@ struct DescriptorView {
   std::size_t cells() const { return static_cast<std::size_t>(rings) * static_cast<std::size_t>(sectors); }
 };
 
+/// The share of the sectors in which anything was seen, [0, 1].
+double seen_share(const DescriptorView& descriptor);
+
 /// The layers of height (docs/method.md, section 4; chosen on simulated drives, seeds 23 and 24).
 struct LayerConstants {
   static constexpr double kLowest_m = 0.5;  ///< of the first layer, above the ground

@@ -6,6 +6,7 @@
 
 #include <revisit/core/stopwatch.hpp>
 #include <revisit/descriptors/similarity.hpp>
+#include <revisit/pipeline/either_view.hpp>
 #include <revisit/verification/elsewhere.hpp>
 #include <revisit/verification/loop_verification.hpp>
 
@@ -42,7 +43,7 @@ Result<Detection> PlaceRecognition::find(const PreparedScan& query, std::size_t 
 }
 
 Result<std::vector<LoopCandidate>> PlaceRecognition::candidates(const PreparedScan& query, std::size_t places) const {
-  if (!retrieval_) return index_.search(query.descriptor, places);
+  if (!retrieval_) return search_either_view(index_, query.descriptor, places, parameters_.retrieval);
   std::vector<LoopCandidate> candidates;
   for (const FrameId frame : retrieval_(query, places)) {
     const auto descriptor = index_.find(frame);

@@ -42,11 +42,16 @@ struct Scratch {
   std::vector<std::uint32_t> upper_bounds;
 };
 
-// The places [begin, end) of a query, `begin` a multiple of 64.
+// The places [first, end) of a query, from the block that `first` lies in on.
 class Part {
  public:
-  Part(Query& query, std::size_t begin, std::size_t end, std::vector<NearImage>& heap)
-      : query_(query), begin_(begin), end_(end), blocks_((end - begin + kBlock - 1) / kBlock), heap_(heap) {}
+  Part(Query& query, std::size_t first, std::size_t end, std::vector<NearImage>& heap)
+      : query_(query),
+        begin_(first / kBlock * kBlock),
+        first_(first),
+        end_(end),
+        blocks_((end - begin_ + kBlock - 1) / kBlock),
+        heap_(heap) {}
 
   // Returns how many places were compared.
   std::size_t search() {
@@ -97,6 +102,7 @@ class Part {
                                                  static_cast<std::uint8_t>(low), static_cast<std::uint8_t>(below - 1));
       const std::size_t here = end_ - begin_ - block * kBlock;
       if (here < kBlock) which &= (std::uint64_t{1} << here) - 1;
+      if (block == 0) which &= ~std::uint64_t{0} << (first_ - begin_);
       if (which != 0) visit(begin_ + block * kBlock, which);
     }
   }
@@ -152,40 +158,42 @@ class Part {
   }
 
   Query& query_;
-  std::size_t begin_, end_, blocks_, compared_ = 0;
+  std::size_t begin_, first_, end_, blocks_, compared_ = 0;
   std::vector<NearImage>& heap_;
   Scratch* scratch_ = nullptr;
 };
 
 }  // namespace
 
-Result<std::vector<NearImage>> nearest_images(const PlaceStore& store, std::size_t places, const std::uint64_t* query,
+Result<std::vector<NearImage>> nearest_images(const PlaceStore& store, PlaceRange places, const std::uint64_t* query,
                                               std::size_t count, std::uint32_t farthest, int threads,
                                               SearchCounts* counts) {
-  if (counts != nullptr) *counts = {places, 0};
+  const std::size_t size = places.size();
+  if (counts != nullptr) *counts = {size, 0};
   std::vector<NearImage> result;
-  if (places == 0 || count == 0) return result;
+  if (size == 0 || count == 0) return result;
   const std::uint32_t rings = store.rows();
   const auto sectors = static_cast<std::uint32_t>(store.sectors());
   thread_local AlignedVector<std::uint8_t> memory;
   memory.resize(std::max(memory.size(), revisit_bits_query_bytes(rings, sectors)));
   revisit_bits_query prepared;
   revisit_bits_prepare(query, rings, sectors, memory.data(), &prepared);
-  Query shared{store, prepared, std::min(count, places), farthest == UINT32_MAX ? farthest : farthest + 1};
+  Query shared{store, prepared, std::min(count, size), farthest == UINT32_MAX ? farthest : farthest + 1};
 
   const std::size_t parts =
-      std::clamp<std::size_t>(places / kPlacesPerThread, 1, static_cast<std::size_t>(std::max(1, threads)));
+      std::clamp<std::size_t>(size / kPlacesPerThread, 1, static_cast<std::size_t>(std::max(1, threads)));
   std::size_t compared = 0;
   if (parts == 1) {
-    compared = Part(shared, 0, places, result).search();
+    compared = Part(shared, places.first, places.last, result).search();
   } else {
-    const std::size_t part_size = (places / parts / kBlock + 1) * kBlock;
+    const std::size_t part_size = (size / parts / kBlock + 1) * kBlock;
     std::vector<std::vector<NearImage>> found(parts);
     std::atomic<std::size_t> sum = 0;
     tbb::task_arena arena(std::min(threads, tbb::this_task_arena::max_concurrency()));
     arena.execute([&] {
       tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t part) {
-        const std::size_t begin = std::min(places, part * part_size), end = std::min(places, begin + part_size);
+        const std::size_t begin = std::min(places.last, places.first + part * part_size),
+                          end = std::min(places.last, begin + part_size);
         if (begin < end) sum += Part(shared, begin, end, found[part]).search();
       });
     });

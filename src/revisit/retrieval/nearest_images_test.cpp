@@ -81,9 +81,9 @@ std::vector<NearImage> compare_all(const PlaceStore& store, const IntensityScanC
   return all;
 }
 
-std::vector<NearImage> nearest_of(std::vector<NearImage> all, std::size_t among, std::size_t count,
+std::vector<NearImage> nearest_of(std::vector<NearImage> all, PlaceRange among, std::size_t count,
                                   std::uint32_t farthest) {
-  all.resize(among);
+  std::erase_if(all, [&](const NearImage& each) { return each.place < among.first || each.place >= among.last; });
   std::erase_if(all, [&](const NearImage& each) { return each.distance > farthest; });
   std::sort(all.begin(), all.end());
   all.resize(std::min(all.size(), count));
@@ -120,16 +120,17 @@ TEST_P(NearestImages, AreThoseOfComparingAll) {
       const IntensityScanContext query = places.again(seen[q], 0.03);
       const std::vector<NearImage> all = compare_all(store, query);
       for (const std::size_t count : {1u, 10u, 25u, 200u, 5000u})
-        for (const std::size_t among : {1u, 64u, 249u, 400u})
+        for (const PlaceRange among : {PlaceRange(1), PlaceRange(64), PlaceRange(249), PlaceRange(400),
+                                       PlaceRange(63, 64), PlaceRange(65, 130), PlaceRange(100, 100)})
           for (const std::uint32_t farthest : {UINT32_MAX, 60u, 0u})
             for (const int threads : {1, 3}) {
               SearchCounts counts;
               expect_same(*nearest_images(store, among, query.occupancy.data(), count, farthest, threads, &counts),
                           nearest_of(all, among, count, farthest));
-              EXPECT_EQ(counts.places, among);
-              if (count == 1 && among == 400) {
+              EXPECT_EQ(counts.places, among.size());
+              if (count == 1 && among.size() == 400) {
                 compared += counts.compared;
-                searched += among;
+                searched += among.size();
               }
             }
     }
@@ -152,7 +153,8 @@ TEST(LargeStore, IsSearchedInPartsThatLeaveNothingOut) {
   for (int i = 0; i < 4; ++i) {
     const IntensityScanContext query = places.again(some[static_cast<std::size_t>(100 * i)], 0.05);
     const std::vector<NearImage> all = compare_all(store, query);
-    for (const std::size_t among : {kPlaces, std::size_t{16'383}, std::size_t{16'400}, std::size_t{24'641}})
+    for (const PlaceRange among : {PlaceRange(kPlaces), PlaceRange(16'383), PlaceRange(16'400), PlaceRange(24'641),
+                                   PlaceRange(130, kPlaces), PlaceRange(4'095, 21'000)})
       for (const std::size_t count : {1u, 40u, 3000u})
         for (const int threads : {1, 2, 3, 8})
           expect_same(*nearest_images(store, among, query.occupancy.data(), count, UINT32_MAX, threads),

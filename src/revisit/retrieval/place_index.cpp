@@ -73,12 +73,12 @@ std::size_t PlaceIndex::until(FrameId newest) const {
   return prefix(store_->size(), [&](std::size_t i) { return store_->frame(i) <= newest; });
 }
 
-Result<std::vector<LoopCandidate>> PlaceIndex::search(const IntensityScanContext& query, std::size_t places,
-                                                      int threads, SearchEffort* effort) const {
-  if (places > 0 &&
+Result<std::vector<LoopCandidate>> PlaceIndex::search(const IntensityScanContext& query, PlaceRange places, int threads,
+                                                      SearchEffort* effort) const {
+  if (places.size() > 0 &&
       (query.rings != store_->rings() || query.sectors != store_->sectors() || query.levels != store_->levels()))
     throw std::invalid_argument("descriptors of different grids cannot be compared");
-  const auto shortlist = options_.shortlist == 0 ? places : static_cast<std::size_t>(options_.shortlist);
+  const auto shortlist = options_.shortlist == 0 ? places.size() : static_cast<std::size_t>(options_.shortlist);
   retrieval_internal::SearchCounts counts;
   const auto nearest =
       retrieval_internal::nearest_images(*store_, places, query.occupancy.data(), shortlist,

@@ -14,6 +14,7 @@
 #include <revisit/core/loop.hpp>
 #include <revisit/core/result.hpp>
 #include <revisit/descriptors/intensity_scan_context.hpp>
+#include <revisit/retrieval/place_range.hpp>
 
 namespace revisit {
 namespace retrieval_internal {
@@ -54,9 +55,9 @@ class PlaceIndex {
   /// The frame of the place added as number `place`, below size().
   FrameId frame(std::size_t place) const;
 
-  /// The best of the first `places` places, best first by geometry plus intensity score (ties: the earlier frame).
+  /// The best of these places, best first by geometry plus intensity score (ties: the earlier frame).
   /// `threads` share the work.
-  Result<std::vector<LoopCandidate>> search(const IntensityScanContext& query, std::size_t places, int threads = 1,
+  Result<std::vector<LoopCandidate>> search(const IntensityScanContext& query, PlaceRange places, int threads = 1,
                                             SearchEffort* effort = nullptr) const;
 
   /// The descriptor of a frame, valid as long as the index. None where the file it lies in was altered.

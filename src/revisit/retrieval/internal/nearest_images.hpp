@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <revisit/retrieval/internal/place_store.hpp>
+#include <revisit/retrieval/place_range.hpp>
 
 namespace revisit::retrieval_internal {
 
@@ -23,10 +24,10 @@ struct SearchCounts {
   std::size_t compared = 0;  ///< whose images were looked at; the rest was excluded by its bound
 };
 
-/// The `count` nearest of the first `places` places, at most `farthest` away, nearest first: exactly those that
+/// The `count` nearest of these places, at most `farthest` away, nearest first: exactly those that
 /// comparing all would give. `threads` share the work. Allocates nothing but the result once its thread has searched
 /// before. An error where the store lies in a file that was altered.
-Result<std::vector<NearImage>> nearest_images(const PlaceStore& store, std::size_t places, const std::uint64_t* query,
+Result<std::vector<NearImage>> nearest_images(const PlaceStore& store, PlaceRange places, const std::uint64_t* query,
                                               std::size_t count, std::uint32_t farthest, int threads = 1,
                                               SearchCounts* counts = nullptr);
 
