@@ -6,7 +6,7 @@
 
 #include <revisit/core/stopwatch.hpp>
 #include <revisit/descriptors/similarity.hpp>
-#include <revisit/pipeline/either_view.hpp>
+#include <revisit/retrieval/either_view.hpp>
 #include <revisit/verification/elsewhere.hpp>
 #include <revisit/verification/loop_verification.hpp>
 

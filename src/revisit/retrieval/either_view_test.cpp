@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <revisit/pipeline/either_view.hpp>
+#include <revisit/retrieval/either_view.hpp>
 
 #include <algorithm>
 #include <random>
@@ -66,8 +66,15 @@ TEST_F(EitherView, OfANarrowQueryTheBestOfEachSessionAreFound) {
     EXPECT_EQ(of_session(plain, 0).size(), plain.size()) << "narrow views of other places differ in fewer cells";
     const auto found = *search_either_view(index_, query, index_.size(), options());
     for (const int each : {0, 1, 2}) EXPECT_EQ(of_session(found, each).size(), 6u);
+    ASSERT_FALSE(of_session(found, session).empty());
     EXPECT_EQ(of_session(found, session).front(), in_map(session, FrameId{7}));
   }
+}
+
+TEST_F(EitherView, OnlyTheFirstPlacesAreSearched) {
+  const auto found = *search_either_view(index_, seen(place(1, 7), kNarrowSectors), kPlaces + 5, options());
+  EXPECT_EQ(found.size(), 11u) << "six of 40 and all five";
+  for (const FrameId each : of_session(found, 1)) EXPECT_LT(in_recording(each), FrameId{5});
 }
 
 TEST_F(EitherView, OfManySessionsFewerEach) {

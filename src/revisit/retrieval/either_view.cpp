@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <revisit/pipeline/either_view.hpp>
+#include <revisit/retrieval/either_view.hpp>
 
 #include <algorithm>
 
