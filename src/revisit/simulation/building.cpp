@@ -171,10 +171,13 @@ std::vector<Knot> walk(double length_m, Random& random) {
   };
   std::vector<Eigen::Vector2d> corners = {{0.5 * kRoomWidth_m, -out}};
   int storey = 0, step = 1;
+  bool is_at_first_corner = false;
   for (int round = 0; length_of(corners) < length_m; ++round) {
     const bool is_left = random.chance(0.6);
+    if (!is_left && !is_at_first_corner) corners.push_back(corner(storey, 0));  // round the core, not through it
     for (int i = 0; i < 4; ++i) corners.push_back(corner(storey, is_left ? (i + 1) % 4 : 3 - i));
     if (!is_left) corners.push_back(corner(storey, 1));
+    is_at_first_corner = is_left || round % 2 == 1;
     if (round % 2 == 0) continue;
     // Through the passage, which leaves from the far corridor upwards and from the near one downwards.
     if (storey + step < 0 || storey + step >= kStoreys) step = -step;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/simulation/internal/world.hpp>
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -141,6 +142,21 @@ TEST(World, PeopleInTheWarehouseStepAside) {
             ADD_FAILURE() << seed << ": at " << time_s << " s";
       }
     }
+  }
+}
+
+TEST(World, ThroughABuildingNobodyWalksThroughWalls) {
+  SimulationOptions options;
+  options.world = "building";
+  options.length_m = 250.0;
+  for (options.seed = 1; options.seed <= 12; ++options.seed) {
+    const World world = *build_building(options);
+    std::size_t in_walls = 0;
+    for (const Knot& knot : world.path.knots())
+      in_walls += std::any_of(world.solids.begin(), world.solids.end(), [&](const Solid& each) {
+        return stands_in(each, knot.x, knot.y) && is_in_the_way(world, each);
+      });
+    EXPECT_EQ(in_walls, 0u) << "seed " << options.seed;
   }
 }
 
