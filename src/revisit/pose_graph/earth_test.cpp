@@ -91,6 +91,13 @@ TEST(Earth, FewFixesPlaceNothing) {
 }
 
 // A straight way, whose fixes tell its heading and not how it leans.
+TEST(Earth, AMapWithoutKeyFramesHasNoPart) {
+  PoseGraph graph;
+  const auto placed = settle_on_earth(graph, {}, {});
+  ASSERT_TRUE(placed);
+  EXPECT_TRUE(placed->empty());
+}
+
 TEST(Earth, AStraightWayStaysUpright) {
   for (const double yaw_rad : {0.5, -2.0}) {
     Drive drive(0.0);
