@@ -19,7 +19,7 @@ namespace revisit {
 struct Detection {
   FrameId frame;
   std::size_t searchable_places = 0;           ///< that could answer: old enough
-  std::vector<LoopCandidate> candidates;       ///< from retrieval, best first
+  std::vector<LoopCandidate> candidates;       ///< from retrieval, best first (of each session: search_either_view())
   std::optional<LoopCandidate> answer;         ///< the candidate that the rest of the evidence is about
   std::optional<TemporalEvidence> temporal;    ///< of the answer
   std::optional<GeometricEvidence> geometric;  ///< of the answer; absent where it was refused before registration

@@ -9,12 +9,12 @@
 
 namespace revisit {
 
-/// The best of the first `places` places, as PlaceIndex::search(). For a narrow query in a map that has sessions of
-/// sensors that see all round, those of each session, and no order among sessions: fewer cells differ between two
-/// sparse descriptors of different places than between those of one place of which one is dense, so that the sparsest
-/// session would leave no candidate to the others. At most `options.top_k` of a session, and four times as many
-/// together unless there are very many sessions. An error where the index was altered. Safe to call from several
-/// threads.
+/// The best of the first `places` places, as PlaceIndex::search() gives them, but for a narrow query (one that sees
+/// less than half of all directions) in a map of several sessions of which any was made with a sensor that sees more.
+/// There each session is searched by itself, and the candidates of one follow those of another. By cells that differ,
+/// sparse descriptors of different places are nearer than a sparse and a dense one of the same place: in one search the
+/// sparsest session would give all candidates. At most `options.top_k` of a session and four times as many together,
+/// but at least three of each session. An error where the index was altered. Safe to call from several threads.
 Result<std::vector<LoopCandidate>> search_either_view(const PlaceIndex& index, const IntensityScanContext& query,
                                                       std::size_t places, const RetrievalOptions& options);
 

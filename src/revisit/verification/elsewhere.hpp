@@ -25,9 +25,9 @@ std::optional<Refusal> refuse_heading(const std::optional<TrajectoryPoint>& plac
 /// Log odds that odometry takes from a pose, 0 or less: those of a Gaussian whose deviation is 0.5 m (2 m where both
 /// views are narrow), half a per cent of the motion in between and what gaps brought; beyond three deviations so many
 /// that nothing makes up for them. Like houses in a row and the storeys of a building are told apart by nothing else.
-/// In the open, up to 3 % of the motion, fewer: odometry may have made a mistake that it did not notice, and what is
-/// far surer than look-alikes are says so. `unknown_log_odds` where odometry says nothing: it lost track in between, or
-/// one of the two has no point.
+/// A pose in the open that is off by no more than 3 % of the motion loses half as many: odometry may have gone wrong
+/// unnoticed, and a place that is far surer than look-alikes are shows it. `unknown_log_odds` where odometry says
+/// nothing: it lost track in between, or one of the two has no point.
 double odometry_log_odds(const std::optional<TrajectoryPoint>& place, const std::optional<TrajectoryPoint>& query,
                          const Pose& T_place_query, const LoopEvidence& evidence, double unknown_log_odds = 0.0);
 
