@@ -72,6 +72,24 @@ TEST(Earth, FixesUndoDriftAndTellHowTheMapLies) {
   }
 }
 
+// A receiver that is somewhere else each time it is wrong, by tens of kilometres: the graph, solved from where the mean
+// of all fixes has it, would stay there.
+TEST(Earth, FixesThatAreAnywhereDoNotCount) {
+  for (const double yaw_rad : {-2.0, 1.0, 2.0}) {
+    Drive drive;
+    const Pose T_earth_truth = at(4000.0, -700.0, yaw_rad);
+    auto all = fixes(drive, T_earth_truth, 0);
+    std::mt19937 random(9);
+    std::normal_distribution<double> anywhere_m(0.0, 30e3);
+    for (std::size_t i = 0; i < all.size(); ++i)
+      if (i % 10 < 4) all[i].position_m += Eigen::Vector3d(anywhere_m(random), anywhere_m(random), 0.0);
+    const auto placed = settle_on_earth(drive.graph, all, drive.parts);
+    ASSERT_TRUE(placed) << placed.error().message;
+    ASSERT_TRUE((*placed)[0]);
+    EXPECT_LT(drive.worst_m(T_earth_truth.inverse() * *(*placed)[0]), 3.0) << yaw_rad;
+  }
+}
+
 // Too few, or all at one place: nothing is moved.
 TEST(Earth, FewFixesPlaceNothing) {
   Drive drive;

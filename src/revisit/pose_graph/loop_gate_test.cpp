@@ -109,6 +109,16 @@ TEST(LoopGate, SureOfItselfButAgainstTheOthers) {
   EXPECT_FALSE(rest[0].enters);
 }
 
+TEST(LoopGate, WhatEnteredAloneCountsAgainstLaterOnes) {
+  LoopGate gate = gate_of_two_visits();
+  EXPECT_TRUE(gate.offer(loop(1010, 10, 0.2, 0.9995)).empty());
+  ASSERT_EQ(gate.decide_all().size(), 1u);
+  EXPECT_TRUE(gate.offer(loop(1014, 30, 0.1, 0.9999)).empty()) << "16 m off";
+  const auto later = gate.decide_all();
+  ASSERT_EQ(later.size(), 1u);
+  EXPECT_FALSE(later[0].enters);
+}
+
 TEST(LoopGate, NothingIsComparedAcrossALossOfTrack) {
   LoopGate gate;
   for (int i = 0; i < 20; ++i) gate.add_keyframe({i}, {0, planar_pose(i, 0, 0), 1.0 * i});
