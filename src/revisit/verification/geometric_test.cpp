@@ -90,6 +90,7 @@ TEST(GeometricConsistency, KnowsWhatTwoSensorsSeeOfAPlace) {
   EXPECT_FALSE(evidence(match, sector).evidence.both_are_narrow);
   EXPECT_FALSE(evidence(other_sector, sector).evidence.one_is_narrow);
   EXPECT_TRUE(evidence(other_sector, sector).evidence.both_are_narrow);
+  EXPECT_FALSE(evidence(match, seen(T_query, -24.8, 5.0, 120.0)).evidence.one_is_narrow) << "a lorry hides a third";
 }
 
 TEST(GeometricConsistency, FeaturesSaveAWrongYaw) {
