@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/registration/sweep_motion.hpp>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <unordered_set>
 #include <vector>
 
@@ -11,10 +13,13 @@ namespace revisit {
 namespace {
 
 struct Sweep {
-  static constexpr std::size_t kLookedAt = 8000;   ///< points of the scan, evenly taken
-  static constexpr double kVoxel_m = 1.0;          ///< of which one a voxel counts
-  static constexpr std::size_t kFewestPairs = 50;  ///< on the surface
-  static constexpr double kWidth_m[] = {1.5, 1.5, 1.0, 1.0, 0.7, 0.7, 0.5, 0.5, 0.5};  ///< of the kernel, by step
+  static constexpr std::size_t kLookedAt = 8000;              ///< points of the scan, evenly taken
+  static constexpr double kVoxel_m = 1.0;                     ///< of which one a voxel counts
+  static constexpr std::size_t kFewestPairs = 50;             ///< on the surface
+  static constexpr double kWidth_m[] = {1.5, 1.0, 0.7, 0.5};  ///< of the kernel
+  static constexpr int kMostSteps = 15;                       ///< with each of them
+  static constexpr double kSteady = 0.02;  ///< done with a width where a point at kArm_m moves less, in widths
+  static constexpr double kArm_m = 20.0;
   // What sensors move at, standard deviations: along the ground, up and down; turns about the vertical, and others.
   static constexpr double kLinear_mps = 10.0, kVertical_mps = 0.5, kTurn_radps = 1.0, kTilt_radps = 0.3;
   static constexpr double kNoise_m = 0.3;  ///< of a point on the surface, with all that is not modelled
@@ -43,6 +48,8 @@ std::vector<SweptPoint> thinned(const Scan& scan) {
   return points;
 }
 
+double moved_at_arm_m(const Vector6& xi) { return xi.head<3>().norm() + Sweep::kArm_m * xi.tail<3>().norm(); }
+
 using Matrix12 = Eigen::Matrix<double, 12, 12>;
 using Vector12 = Eigen::Matrix<double, 12, 1>;
 
@@ -56,8 +63,12 @@ std::optional<SweepMotion> find_sweep_motion(const Surface& target, const Scan& 
   Vector6 deviations;
   deviations << Sweep::kLinear_mps, Sweep::kLinear_mps, Sweep::kVertical_mps, Sweep::kTilt_radps, Sweep::kTilt_radps,
       Sweep::kTurn_radps;
+  double sweep_s = 0.0;
+  for (const SweptPoint& each : points) sweep_s = std::max(sweep_s, std::abs(each.time_s));
   const Vector6 prior = (Sweep::kNoise_m * Sweep::kNoise_m) * deviations.cwiseAbs2().cwiseInverse();
-  for (const double width_m : Sweep::kWidth_m) {
+  std::size_t width = 0;
+  for (int steps = 0; width < std::size(Sweep::kWidth_m);) {
+    const double width_m = Sweep::kWidth_m[width];
     // Of a small motion of the pose, and of a change of the twist: a point at time t feels t times the latter.
     Matrix12 H = Matrix12::Zero();
     Vector12 g = Vector12::Zero();
@@ -89,6 +100,8 @@ std::optional<SweepMotion> find_sweep_motion(const Surface& target, const Scan& 
     found.T_target_source = found.T_target_source * small_motion(step.head<6>());
     found.motion.linear_mps += step.segment<3>(6);
     found.motion.angular_radps += step.tail<3>();
+    const double moved_m = moved_at_arm_m(step.head<6>()) + sweep_s * moved_at_arm_m(step.tail<6>());
+    if (++steps == Sweep::kMostSteps || moved_m < Sweep::kSteady * width_m) ++width, steps = 0;
   }
   const Pose moved = T_guess_target_source.inverse() * found.T_target_source;
   if (moved.translation().norm() > Sweep::kMost_m) return std::nullopt;

@@ -37,13 +37,16 @@ TEST(SweepMotion, IsFoundWithThePoseFromASurface) {
   const Pose T_place_query = SyntheticWorld::at(0.8, 0.4, 0.1);
   const Scan query = swept(world.scan(T_place_query, kSensor, 2));
   const SurfaceCloud surface(thin(place.points, {}, 1.0));
-  const Pose T_guess = planar_pose(0.5, 0.5, 0.12);
-  const auto found = find_sweep_motion(surface, query, T_guess, true);
-  ASSERT_TRUE(found);
   const Pose T_true = SyntheticWorld::at(0, 0, 0).inverse() * T_place_query;
-  EXPECT_LT((found->motion.linear_mps - kMotion.linear_mps).norm(), 1.5);
-  EXPECT_LT((found->motion.angular_radps - kMotion.angular_radps).norm(), 0.15);
-  EXPECT_LT((T_true.inverse() * found->T_target_source).translation().norm(), 0.1);
+  for (const double off_m : {-1.5, -0.3, 1.5})
+    for (const double yaw_rad : {0.05, 0.15}) {
+      const auto found = find_sweep_motion(surface, query, planar_pose(0.8 + off_m, 0.4, yaw_rad), true);
+      ASSERT_TRUE(found) << off_m;
+      EXPECT_LT((found->motion.linear_mps - kMotion.linear_mps).norm(), 0.5) << off_m;
+      EXPECT_LT((found->motion.angular_radps - kMotion.angular_radps).norm(), 0.03) << off_m;
+      EXPECT_LT((T_true.inverse() * found->T_target_source).translation().norm(), 0.03) << off_m;
+    }
+  const Pose T_guess = planar_pose(0.5, 0.5, 0.12);
   EXPECT_FALSE(find_sweep_motion(surface, query, T_guess, false)) << "nothing moves so fast among walls";
 }
 
