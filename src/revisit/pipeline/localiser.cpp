@@ -91,10 +91,11 @@ Result<Localisation> Localiser::locate(Scan scan) {
   const auto motion = motion_of(*prepared, *detection);
   if (!motion) return motion.error();
   if (*motion) {
-    // Once more, without what the motion did to it. The surer answer counts, as poses or as refusals do.
+    // Once more where it fits best, without what the motion did to it. The surer answer counts, as poses or as
+    // refusals do.
     auto undistorted = preparation_.prepare(std::move(scan), **motion);
     if (undistorted) {
-      auto again = recognition_.find(*undistorted, places(), typical_, true);
+      auto again = recognition_.find_there(*undistorted, *detection, typical_);
       if (!again) return again.error();
       const Detection::Registered *const likeliest = detection->likeliest(), *const now = again->likeliest();
       if (now != nullptr && now->evidence.own_log_odds > likeliest->evidence.own_log_odds) {

@@ -109,17 +109,41 @@ Status PlaceRecognition::verify(const PreparedScan& query, const TypicalAgreemen
   auto answer = verification.verify(detection.candidates);
   if (!answer) return answer.error();
   detection.tried_further = verification.has_tried_further();
-  for (const Hypothesis& each : verification.hypotheses())
-    if (each.geometric) detection.registered.push_back({each.candidate.match, *each.geometric});
-  if (*answer) {
-    this->answer(*std::move(*answer), verification.registration().query_geometry(), detection);
-    if (is_to_be_followed(detection, query.trajectory_point))
-      following_.add(*query.trajectory_point, detection.loop->match, *points_.at(detection.loop->match),
-                     detection.loop->T_match_query, detection.geometric->log_odds);
-  }
+  conclude(verification, *std::move(answer), detection);
+  if (is_to_be_followed(detection, query.trajectory_point))
+    following_.add(*query.trajectory_point, detection.loop->match, *points_.at(detection.loop->match),
+                   detection.loop->T_match_query, detection.geometric->log_odds);
   detection.temporal_ms = verification.registration().temporal_ms();
   detection.geometric_ms = watch.lap_ms();
   return ok();
+}
+
+Result<Detection> PlaceRecognition::find_there(const PreparedScan& query, Detection before,
+                                               const TypicalAgreement& typical) {
+  const VerificationQuery question{query.scan.frame, query.descriptor, query.cloud, query.geometry,
+                                   query.trajectory_point};
+  const VerificationContext context = this->context(typical, following_);
+  LoopVerification verification(context, question);
+  std::vector<Hypothesis> tested;
+  for (Detection::Registered& each : before.registered) {
+    Hypothesis& hypothesis = tested.emplace_back();
+    hypothesis.candidate.match = each.match;
+    hypothesis.refusal = each.evidence.refusal;
+    hypothesis.geometric = std::move(each.evidence);
+  }
+  auto answer = verification.verify_there(tested);
+  if (!answer) return answer.error();
+  before.registered.clear();
+  before.loop.reset();
+  conclude(verification, *std::move(answer), before);
+  return before;
+}
+
+void PlaceRecognition::conclude(LoopVerification& verification, std::optional<Hypothesis> answer,
+                                Detection& detection) const {
+  for (const Hypothesis& each : verification.hypotheses())
+    if (each.geometric) detection.registered.push_back({each.candidate.match, *each.geometric});
+  if (answer) this->answer(*std::move(answer), verification.registration().query_geometry(), detection);
 }
 
 // The place elsewhere that looks most like the scan, as retrieval would have it.

@@ -20,6 +20,8 @@
 
 namespace revisit {
 
+class LoopVerification;
+
 /// Retrieval and verification over the places seen so far: what LoopDetector, Slam and Localiser share. Frames
 /// increase. Belongs to one thread at a time.
 class PlaceRecognition {
@@ -34,6 +36,8 @@ class PlaceRecognition {
   /// where a place cannot be read.
   Result<Detection> find(const PreparedScan& query, std::size_t places, const TypicalAgreement& typical,
                          bool is_thorough = false);
+  /// The scan of `before`, prepared anew, looked for where it fitted best or nearly so, and nowhere else.
+  Result<Detection> find_there(const PreparedScan& query, Detection before, const TypicalAgreement& typical);
   /// Follows loops backwards, two scans a call: those of the last metres that had none when they came, and have one now
   /// (BackwardFollowing). `detection`: what find() said of the newest scan, at this point of the trajectory.
   Result<std::vector<Detection>> follow_back(const Detection& detection, const std::optional<TrajectoryPoint>& point,
@@ -93,6 +97,7 @@ class PlaceRecognition {
   Status learn_look_alikes(const PreparedScan& query, CandidateRegistration& registration);
   Result<std::optional<Detection>> find_again(const BackwardFollowing::Query& query, const TypicalAgreement& typical);
   bool is_to_be_followed(const Detection& detection, const std::optional<TrajectoryPoint>& point) const;
+  void conclude(LoopVerification& verification, std::optional<Hypothesis> answer, Detection& detection) const;
   static void answer(Hypothesis hypothesis, const ScanGeometry& query_geometry, Detection& detection);
 
   Parameters parameters_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <revisit/verification/acceptance.hpp>
 #include <revisit/verification/elsewhere.hpp>
@@ -21,6 +22,9 @@ struct NearerPlace {
 // Poses that are registered besides, where a scan alone fits none of the best: where places look alike, the right one
 // may come later (docs/maps.md, "Further places").
 constexpr std::size_t kFurther = 11;
+
+// What fits so much less well than the best does so once more.
+constexpr double kNearly_log_odds = 10.0;
 
 struct StandingOut {
   static constexpr double kFar_log_odds = 8.0;  ///< above the next one: nothing is like it
@@ -49,8 +53,30 @@ Result<std::optional<Hypothesis>> LoopVerification::verify(std::span<const LoopC
       there && std::none_of(hypotheses_.begin(), hypotheses_.end(),
                             [&](const Hypothesis& each) { return each.candidate.match == there->candidate.match; }))
     hypotheses_.push_back(*there);
-  if (hypotheses_.empty()) return std::optional<Hypothesis>();
+  return best_of_tested();
+}
 
+Result<std::optional<Hypothesis>> LoopVerification::verify_there(std::span<const Hypothesis> before) {
+  double best = -std::numeric_limits<double>::infinity();
+  for (const Hypothesis& each : before) {
+    if (!each.geometric) continue;
+    hypotheses_.push_back(each);
+    best = std::max(best, each.own_log_odds());
+  }
+  for (Hypothesis& each : hypotheses_) {
+    if (each.own_log_odds() < best - kNearly_log_odds) {
+      each.refusal = Refusal{Refusal::Reason::kImprobable};  // it was accepted for what the scan is no longer
+      continue;
+    }
+    auto again = registration_.test({each.candidate.match, each.geometric->T_match_query, 0.0});
+    if (!again) return again.error();
+    each = *std::move(again);
+  }
+  return best_of_tested();
+}
+
+Result<std::optional<Hypothesis>> LoopVerification::best_of_tested() {
+  if (hypotheses_.empty()) return std::optional<Hypothesis>();
   if (!query_.trajectory_point) trust_what_stands_out();
   weigh_against_each_other();
   std::optional<Hypothesis> best =

@@ -21,6 +21,9 @@ class LoopVerification {
   /// The same for a query that was refused when it came, and that a later loop leads back to (BackwardFollowing): the
   /// place predicted is tested, against the poses that were registered then. None where no loop reaches it.
   Result<std::optional<Hypothesis>> verify_again(std::span<const RegisteredPose> registered);
+  /// The same for a scan that is prepared anew, registered where it fitted best before or nearly so, and nowhere else;
+  /// `before` is what was tested then. None where nothing was registered.
+  Result<std::optional<Hypothesis>> verify_there(std::span<const Hypothesis> before);
   /// Everything that was tested.
   const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
   /// Whether a scan alone was registered with places that fit less well from overhead, too.
@@ -29,6 +32,7 @@ class LoopVerification {
 
  private:
   Result<std::optional<Hypothesis>> test_predicted_place();
+  Result<std::optional<Hypothesis>> best_of_tested();
   Status test_nearer_place(Hypothesis& answer);
   void trust_what_stands_out();
   void weigh_against_each_other();

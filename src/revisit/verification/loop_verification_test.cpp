@@ -103,6 +103,38 @@ TEST_F(LoopVerificationTest, ALaterLoopLeadsBackUnlessAnotherPoseWasAsSure) {
   EXPECT_FALSE(*out_of_reach.verify_again({}));
 }
 
+TEST_F(LoopVerificationTest, AScanPreparedAnewIsRegisteredWhereItFittedBest) {
+  const Described blurred = described(home_, SyntheticWorld::at(2.2, 0.3, 0.0));
+  const Described query = described(home_, SyntheticWorld::at(2.4, 0.3, 0.0));
+  const VerificationQuery before{FrameId{1000}, blurred.descriptor, blurred.cloud, nullptr, std::nullopt};
+  const VerificationQuery now{FrameId{1000}, query.descriptor, query.cloud, nullptr, std::nullopt};
+  parameters_.geometric.min_overlap = 0.0;
+  const VerificationContext known = context();
+  LoopVerification first(known, before), second(known, now);
+  ASSERT_TRUE(first.verify(candidates(blurred, {2, 90})));
+  const auto of = [](const LoopVerification& verification, int place) {
+    return *std::find_if(verification.hypotheses().begin(), verification.hypotheses().end(),
+                         [&](const Hypothesis& each) { return each.candidate.match == FrameId{place}; });
+  };
+  ASSERT_TRUE(of(first, 90).geometric) << "another world, which fits far less well";
+  const auto answer = second.verify_there(first.hypotheses());
+  ASSERT_TRUE(answer && *answer);
+  EXPECT_TRUE((*answer)->is_accepted());
+  EXPECT_EQ((*answer)->candidate.match, FrameId{2});
+  EXPECT_NEAR(of(second, 2).geometric->T_match_query.translation().x(), 0.4, 0.05);
+  EXPECT_EQ(of(second, 90).geometric->T_match_query.matrix(), of(first, 90).geometric->T_match_query.matrix());
+  // What is not registered anew is no answer, though it was accepted before.
+  std::vector<Hypothesis> misled = first.hypotheses();
+  for (Hypothesis& each : misled)
+    if (each.candidate.match == FrameId{90}) each.geometric->own_log_odds = 100.0;
+  LoopVerification third(known, now);
+  const auto none = third.verify_there(misled);
+  ASSERT_TRUE(none && *none);
+  EXPECT_FALSE((*none)->is_accepted());
+  LoopVerification nowhere(known, now);
+  EXPECT_FALSE(*nowhere.verify_there({}));
+}
+
 TEST_F(LoopVerificationTest, AFollowedLoopIsTestedFirstAndAlone) {
   const TrajectoryPoint before{.segment = 7}, now = before.after(planar_pose(1, 0, 0));
   following_.add(before, FrameId{2}, *points_.at(FrameId{2}), Pose::Identity(), 12.0);
