@@ -66,7 +66,8 @@ const std::vector<Entry>& table() {
       REVISIT_SWITCH(geometric, follow,
                      "test first the place that the last loops and odometry predict, and let them support what agrees"),
       REVISIT_REAL(geometric, min_overlap, 0, 1,
-                   "least overlap from overhead, the smaller of both directions, that is worth registering"),
+                   "least overlap from overhead, the smaller of both directions, that is worth registering; two thirds "
+                   "of it for a scan alone in a map"),
       REVISIT_CHOICE(
           geometric, features, "never, fallback, first",
           "FPFH features: never; as a fallback where the yaw of the descriptors gave no loop (slow); or first, "

@@ -16,8 +16,8 @@ constexpr int kMost = 4;
 // Where a pose is surer than each of several others, the more the farther (docs/maps.md, "Standing out").
 struct StandingOut {
   static constexpr std::size_t kFewestOthers = 6;
-  static constexpr double kBegins_log_odds = 8.0, kFar_log_odds = 12.0;  ///< ahead of the likeliest other
-  static constexpr double kMost_log_odds = 2.5;
+  static constexpr double kBegins_log_odds = 8.0, kFar_log_odds = 16.0;  ///< ahead of the likeliest other
+  static constexpr double kMost_log_odds = 5.0;
 };
 
 }  // namespace

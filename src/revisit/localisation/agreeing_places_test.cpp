@@ -52,8 +52,8 @@ TEST(AgreeingPlaces, APoseThatStandsOutAmongSeveralIsTrustedMore) {
   for (int i = 0; i < 5; ++i) places.add_against(-20.0);
   EXPECT_NEAR(places.log_odds(), 1.0, 1e-6) << "five others are too few";
   places.add_against(-30.0);
-  EXPECT_NEAR(places.log_odds(), 3.5, 1e-6);
-  for (const auto& [other, more] : {std::pair{-11.0, 2.5}, {-9.0, 1.25}, {-7.0, 0.0}, {-30.0, 0.0}}) {
+  EXPECT_NEAR(places.log_odds(), 6.0, 1e-6);
+  for (const auto& [other, more] : {std::pair{-15.0, 5.0}, {-11.0, 2.5}, {-7.0, 0.0}, {-30.0, 0.0}}) {
     places.add_against(other);
     EXPECT_NEAR(places.log_odds(), 1.0 + more, 1e-6) << "the likeliest of the others counts: " << other;
   }

@@ -24,6 +24,10 @@ const double kYawMargin_rad = to_radians(3.0);
 // tree for tree, wrong ones reach 3.2 by themselves (OS0-128 and rosette along 08, seed 304). With 3 less in rooms, 242
 // of a rosette's 349 loops on the storeys of a building were false; with 6 less none (docs/accuracy.md).
 constexpr double kUnknownInTheOpen_log_odds = -3.0, kUnknownInRooms_log_odds = -6.0;
+
+// Of the least overlap: a scan that comes alone has no other one beside it that may overlap more.
+constexpr double kLessForOneAlone = 2.0 / 3.0;
+
 }  // namespace
 
 CandidateRegistration::CandidateRegistration(const VerificationContext& context, const VerificationQuery& query)
@@ -72,9 +76,9 @@ Result<std::vector<Hypothesis>> CandidateRegistration::open(std::span<const Loop
   }
   if (hypotheses.empty() && elsewhere) return std::vector{*std::move(elsewhere)};
   if (options_.overhead_search) {
+    const double least = query_.trajectory_point ? options_.min_overlap : kLessForOneAlone * options_.min_overlap;
     for (Hypothesis& each : hypotheses)
-      if (each.overlap < options_.min_overlap)
-        each.refusal = Refusal{Refusal::Reason::kLowOverlap, each.overlap, options_.min_overlap};
+      if (each.overlap < least) each.refusal = Refusal{Refusal::Reason::kLowOverlap, each.overlap, least};
     std::stable_sort(hypotheses.begin(), hypotheses.end(),
                      [](const Hypothesis& a, const Hypothesis& b) { return a.overlap > b.overlap; });
   }

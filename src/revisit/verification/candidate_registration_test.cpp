@@ -2,6 +2,7 @@
 #include <revisit/verification/candidate_registration.hpp>
 
 #include <cmath>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -38,6 +39,16 @@ TEST_F(CandidateRegistrationTest, TheBestFromOverheadAreRegisteredAndNoMore) {
     for (std::size_t i = 1; i < found.size(); ++i) EXPECT_GE(found[i - 1].overlap, found[i].overlap);
   }
   EXPECT_EQ(tested({2}).size(), CandidateRegistration::kPosesAPlace) << "two poses a place";
+}
+
+TEST_F(CandidateRegistrationTest, AScanAloneMayOverlapLess) {
+  const double overlap = tested({2}).front().overlap;
+  const TrajectoryPoint on_its_way{.segment = 7};
+  for (const auto& [share, alone] : {std::pair{0.7, true}, {0.6, false}}) {
+    parameters_.geometric.min_overlap = overlap / share;
+    EXPECT_EQ(tested({2}).front().geometric.has_value(), alone) << share;
+    EXPECT_FALSE(tested({2}, on_its_way).front().geometric) << "its neighbours may overlap more";
+  }
 }
 
 TEST_F(CandidateRegistrationTest, OfARegisteredOneThePoseIsRight) {
