@@ -217,6 +217,28 @@ TEST(SeenSpace, PutsPointsWhereExactAnglesDo) {
   EXPECT_GT(compared, 15000);
 }
 
+// Beams up to so many degrees, of which those above 3 degrees meet nothing in an open part of the circle.
+SeenSpace seen_below(int highest_deg, int open_deg) {
+  std::vector<Point> points;
+  for (int azimuth = 0; azimuth < 360; ++azimuth)
+    for (int elevation = -15; elevation <= (azimuth < open_deg ? std::min(highest_deg, 3) : highest_deg); ++elevation) {
+      const double yaw_rad = to_radians(azimuth + 0.5), pitch_rad = to_radians(elevation);
+      points.push_back({static_cast<float>(10.0 * std::cos(pitch_rad) * std::cos(yaw_rad)),
+                        static_cast<float>(10.0 * std::cos(pitch_rad) * std::sin(yaw_rad)),
+                        static_cast<float>(10.0 * std::sin(pitch_rad)), 0.5f});
+    }
+  return SeenSpace(points);
+}
+
+TEST(SeenSpace, ARoofIsSeenAllRoundByWhatLooksUp) {
+  EXPECT_TRUE(seen_below(15, 0).is_roofed());
+  EXPECT_TRUE(seen_below(44, 12).is_roofed()) << "a gate";
+  EXPECT_FALSE(seen_below(15, 30).is_roofed()) << "a street, at one end";
+  EXPECT_FALSE(seen_below(15, 340).is_roofed()) << "a tower";
+  EXPECT_FALSE(seen_below(2, 0).is_roofed()) << "nothing looks up";
+  EXPECT_FALSE(SeenSpace().is_roofed());
+}
+
 TEST(SeenSpace, KnowsWhatLiesBeforeAndBehind) {
   std::vector<Point> points;
   for (int i = 0; i < 100; ++i) points.push_back({20.f, -1.f + 0.02f * static_cast<float>(i), 0.1f, 0.f});

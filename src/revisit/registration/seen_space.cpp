@@ -14,6 +14,13 @@ namespace {
 
 constexpr int kAzimuths = 120, kElevations = 30;
 constexpr int kWidestGap = kAzimuths / 4;  // of a sensor that sees all round: what stands close by hides nothing wider
+
+struct Roof {
+  static constexpr std::size_t kLower = kAzimuths * 9 / 10;  ///< azimuths that look up less far than the sensor does
+  static constexpr int kLeast = kElevations / 2 + 3;         ///< cells below where that is
+  static constexpr int kFewest = kAzimuths * 95 / 100;       ///< azimuths that look up as far, or a cell less
+};
+
 constexpr auto kCellsARad = static_cast<float>(kAzimuths / (2.0 * kPi));
 
 // Angles in cells, counted from the left and from below.
@@ -98,6 +105,18 @@ SeenSpace::Sector SeenSpace::sector() const {
   const float half = 0.5f * static_cast<float>(kAzimuths - widest);
   const float middle_rad = (static_cast<float>(sector_begins) + half) / kCellsARad - static_cast<float>(kPi);
   return {{std::cos(middle_rad), std::sin(middle_rad)}, std::cos(half / kCellsARad), 2.f * half / kCellsARad};
+}
+
+bool SeenSpace::is_roofed() const {
+  if (cells_.empty()) return false;
+  std::array<int, kAzimuths> highest{};  // cells up to the highest one that was seen
+  for (std::size_t i = 0; i < kCells; ++i)
+    if (cells_[i].farthest_cm > 0) highest[i / kElevations] = static_cast<int>(i % kElevations) + 1;
+  std::array<int, kAzimuths> sorted = highest;
+  std::nth_element(sorted.begin(), sorted.begin() + Roof::kLower, sorted.end());
+  const int top = sorted[Roof::kLower];
+  return top > Roof::kLeast &&
+         std::count_if(highest.begin(), highest.end(), [&](int each) { return each >= top - 1; }) >= Roof::kFewest;
 }
 
 std::vector<std::uint16_t> SeenSpace::ranges_cm() const {

@@ -41,6 +41,10 @@ class SeenSpace {
   };
   Sector sector() const;
 
+  /// Something was seen overhead all round: in nearly every azimuth the beams that look up farthest, 9 degrees and
+  /// more, came back. False for a sensor that does not look up so far.
+  bool is_roofed() const;
+
   void archive(auto& fields) {
     fields(cells_);
     fields.require(cells_.empty() || cells_.size() == kCells);

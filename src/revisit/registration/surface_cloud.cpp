@@ -66,7 +66,7 @@ SensorView view_of(const ThinCloud& cloud) {
     if (const float across_m = p.head<2>().norm(); across_m > 0.f) slopes.push_back(p.z() / across_m);
   }
   return {nth(ranges, Seeing::kShare), nth(slopes, Seeing::kOutermost), nth(slopes, 1.0 - Seeing::kOutermost),
-          cloud.seen.sector()};
+          cloud.seen.sector(), cloud.seen.is_roofed()};
 }
 
 }  // namespace
@@ -104,7 +104,7 @@ SurfaceCloud::SurfaceCloud(ThinCloud cloud) : cloud_(std::move(cloud)) {
 }
 
 bool SurfaceCloud::is_in_the_open() const {
-  return voxel_m() >= Open::kVoxel_m || view_.farthest_m >= Open::kFarthest_m;
+  return (voxel_m() >= Open::kVoxel_m || view_.farthest_m >= Open::kFarthest_m) && !view_.is_roofed;
 }
 
 SurfaceCloud::~SurfaceCloud() = default;
