@@ -61,6 +61,7 @@ Result<std::optional<Hypothesis>> LoopVerification::verify_there(std::span<const
   for (const Hypothesis& each : before) {
     if (!each.geometric) continue;
     hypotheses_.push_back(each);
+    hypotheses_.back().geometry.reset();
     best = std::max(best, each.own_log_odds());
   }
   for (Hypothesis& each : hypotheses_) {
@@ -118,7 +119,7 @@ void LoopVerification::trust_what_stands_out() {
     const double share = std::clamp(next / StandingOut::kFar_log_odds, 0.0, 1.0) * StandingOut::kMostTrust;
     GeometricEvidence& found = *each.geometric;
     decide(found, -caution * (1.0 - share), found.log_odds - found.own_log_odds, context_.parameters.geometric);
-    each.refusal = found.refusal;
+    if (each.geometry) each.refusal = found.refusal;  // else as it was before: no answer (verify_there)
   }
 }
 

@@ -127,10 +127,14 @@ TEST_F(LoopVerificationTest, AScanPreparedAnewIsRegisteredWhereItFittedBest) {
   std::vector<Hypothesis> misled = first.hypotheses();
   for (Hypothesis& each : misled)
     if (each.candidate.match == FrameId{90}) each.geometric->own_log_odds = 100.0;
-  LoopVerification third(known, now);
-  const auto none = third.verify_there(misled);
-  ASSERT_TRUE(none && *none);
-  EXPECT_FALSE((*none)->is_accepted());
+  for (const double look_alikes_log_odds : {0.0, -2.0}) {
+    VerificationContext cautious = context();
+    cautious.look_alikes_log_odds = look_alikes_log_odds;
+    LoopVerification third(cautious, now);
+    const auto none = third.verify_there(misled);
+    ASSERT_TRUE(none && *none);
+    EXPECT_FALSE((*none)->is_accepted());
+  }
   LoopVerification nowhere(known, now);
   EXPECT_FALSE(*nowhere.verify_there({}));
 }
