@@ -330,7 +330,7 @@ test("of two results, the keys go through the loops of the side that was clicked
 
 test("a report is one file that needs no server", async (context) => {
   const file = join(work, "report.html");
-  revisit("view", results(), "--report", file, "--report-mb", "1");
+  revisit("view", results(), "--report", file, "--report-mb", "4");
   const page = await open(context, `file://${file}`);
   assert.ok((await settle(page)) > 5_000);
   await page.keyboard.press("n");
