@@ -16,9 +16,9 @@ constexpr int kAzimuths = 120, kElevations = 30;
 constexpr int kWidestGap = kAzimuths / 4;  // of a sensor that sees all round: what stands close by hides nothing wider
 
 struct Roof {
-  static constexpr std::size_t kLower = kAzimuths * 9 / 10;  ///< azimuths that look up less far than the sensor does
-  static constexpr int kLeast = kElevations / 2 + 3;         ///< cells below where that is
-  static constexpr int kFewest = kAzimuths * 95 / 100;       ///< azimuths that look up as far, or a cell less
+  static constexpr std::size_t kLower = kAzimuths * 9 / 10;  ///< of the azimuths, sorted: where the sensor's limit is
+  static constexpr int kLeast = kElevations / 2 + 3;         ///< cells below that limit: 9 degrees up, or more
+  static constexpr int kFewest = kAzimuths * 95 / 100;       ///< azimuths seen up to the limit, or a cell less
 };
 
 constexpr auto kCellsARad = static_cast<float>(kAzimuths / (2.0 * kPi));

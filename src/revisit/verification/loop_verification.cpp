@@ -23,7 +23,7 @@ struct NearerPlace {
 // may come later (docs/maps.md, "Further places").
 constexpr std::size_t kFurther = 11;
 
-// What fits so much less well than the best does so once more.
+// Of a scan that is prepared anew: poses that are so far behind the likeliest are not registered again.
 constexpr double kNearly_log_odds = 10.0;
 
 struct StandingOut {
