@@ -90,6 +90,23 @@ TEST(Earth, FixesThatAreAnywhereDoNotCount) {
   }
 }
 
+// A receiver that is wrong for two fifths of the way in one piece, as between high houses, and always by the same:
+// these fixes agree with one another.
+TEST(Earth, AStretchOfWrongFixesDoesNotCount) {
+  const Pose T_earth_truth = at(4000.0, -700.0, 2.0);
+  for (const double times : {1.0, 10.0, 100.0})
+    for (const std::size_t first : {0, 12, 24, 36}) {
+      Drive drive;
+      auto all = fixes(drive, T_earth_truth, 0);
+      for (std::size_t i = first; i < first + 24; ++i) all[i].position_m += times * Eigen::Vector3d(30.0, -20.0, 10.0);
+      const auto placed = settle_on_earth(drive.graph, all, drive.parts);
+      ASSERT_TRUE(placed) << placed.error().message;
+      ASSERT_TRUE((*placed)[0]);
+      // Where there is no fix, odometry alone says how the way goes: its drift over 240 m.
+      EXPECT_LT(drive.worst_m(T_earth_truth.inverse() * *(*placed)[0]), 9.0) << times << " from " << first;
+    }
+}
+
 // Too few, or all at one place: nothing is moved.
 TEST(Earth, FewFixesPlaceNothing) {
   Drive drive;

@@ -16,9 +16,9 @@ namespace {
 
 using pose_graph_internal::GravityTerms;
 
-// Of a right edge the squared error stays below this in 999 of 1000 cases (chi-square, 6 degrees of freedom); of right
-// readings of gravity, of which there are many, in all but one of 100,000 (2 degrees of freedom).
-constexpr double kTruncation = 22.46, kTruncationOfUp = 23.03;
+// Of right readings of gravity, of which there are many, the squared error stays below this in all but one of 100,000
+// cases (chi-square, 2 degrees of freedom).
+constexpr double kTruncationOfUp = 23.03;
 constexpr double kSharpen = 2.0;
 constexpr int kMostRounds = 60, kIterationsARound = 5, kIterationsAtLast = 20;
 
