@@ -89,7 +89,7 @@ def main():
             lines = right.splitlines()
             was, lines[number] = described(tree, file, number, line), line
             file.write_text("\n".join(lines) + "\n")
-            is_found = run("cmake", "--build", build, "--target", f"{module}_test") != 0 or run(build / "bin" / f"{module}_test", "--gtest_fail_fast", timeout=300) != 0
+            is_found = run("cmake", "--build", build, "--target", f"{module}_test") != 0 or run(build / "bin" / f"{module}_test", "--gtest_fail_fast", timeout=60) != 0
             file.write_text(right)
             found += is_found
             if not is_found:

@@ -35,6 +35,8 @@ TEST(LoopGate, ALoopWaitsUntilAnotherAgrees) {
   ASSERT_EQ(decisions.size(), 2u);
   EXPECT_EQ(decisions[0].loop.query, FrameId{1010});
   EXPECT_TRUE(decisions[0].enters && decisions[1].enters);
+  EXPECT_EQ(decisions[0].agreeing, 1u);
+  EXPECT_EQ(decisions[1].agreeing, 1u);
   EXPECT_TRUE(gate.decide_all().empty());
 }
 
@@ -198,6 +200,42 @@ TEST(LoopGate, SessionsAreJoinedByManyLoopsOverALongWay) {
   LoopConstraint against = loop(0, 31, 0.0);
   against.query = in_map(1, {5});
   EXPECT_EQ(joined_by(6, 5, against), 0u) << "another loop says 26 m on";
+}
+
+// Six loops from 25 m of the way to one place say of the map what one of them says; so do loops from one place.
+TEST(LoopGate, SessionsAreJoinedByLoopsThatSpreadInBoth) {
+  for (const bool one_match : {false, true}) {
+    LoopGate gate = gate_of_two_sessions();
+    std::size_t entered = 0;
+    for (int i = 0; i < 6; ++i) {
+      LoopConstraint each = loop(0, one_match ? 0 : 5 * i, one_match ? 5.0 * i : -5.0 * i, 0.9999);
+      each.query = in_map(1, {one_match ? 5 * i : 0});
+      entered += gate.offer(each).size();
+    }
+    EXPECT_EQ(entered, 0u) << one_match;
+  }
+}
+
+// Where one session ends the next may begin, but nobody has seen that: it takes as many loops as anywhere.
+TEST(LoopGate, ASessionDoesNotGoOnWhereAnotherOneEnded) {
+  LoopGate gate = gate_of_two_sessions();
+  TrajectoryPoint point{.segment = 2, .origin = 2};
+  for (int i = 0; i < 30; ++i) {
+    gate.add_keyframe(in_map(2, {i}), point);
+    point = point.after(planar_pose(1, 0, 0));
+  }
+  const auto offer = [&](FrameId query, FrameId match) {
+    LoopConstraint each = loop(0, 0, 0.0);
+    each.query = query;
+    each.match = match;
+    const auto decisions = gate.offer(each);
+    for (const auto& decision : decisions) gate.join(decision.loop);
+    return decisions.size();
+  };
+  std::size_t joined = 0;
+  for (int i = 0; i <= 25; i += 5) joined += offer(in_map(1, {i + 30}), {i});
+  ASSERT_EQ(joined, 6u);
+  for (int i = 0; i <= 12; i += 3) EXPECT_EQ(offer(in_map(2, {i}), {30 + i}), 0u) << i;
 }
 
 // A corridor of another building that looks the same: what follows from one look-alike agrees with it.
