@@ -24,13 +24,14 @@ std::ostream& operator<<(std::ostream& stream, const Pose& T) {
 }
 
 bool read(std::istream& stream, Pose& T) {
-  double x = 0, y = 0, z = 0, qx = 0, qy = 0, qz = 0, qw = 0;
-  if (!(stream >> x >> y >> z >> qx >> qy >> qz >> qw)) return false;
-  const Eigen::Quaterniond q(qw, qx, qy, qz);
+  Eigen::Matrix<double, 7, 1> values;  // x y z, quaternion x y z w
+  for (double& each : values)
+    if (!(stream >> each)) return false;
+  const Eigen::Quaterniond q(values.tail<4>());
   if (!(std::abs(q.norm() - 1.0) < 0.01)) return false;
   T = Pose::Identity();
   T.linear() = q.normalized().toRotationMatrix();
-  T.translation() << x, y, z;
+  T.translation() = values.head<3>();
   return T.matrix().allFinite();
 }
 

@@ -124,6 +124,41 @@ TEST(KeyframeGraph, SettlesAtTheLatestAfterTwentyKeyframes) {
   EXPECT_TRUE(drive.graph.is_settled());
 }
 
+TEST(KeyframeGraph, OneLoopIsSettledWhenAsked) {
+  OutAndBack drive;
+  drive.graph.add_loop(OutAndBack::loop(38));
+  ASSERT_TRUE(drive.graph.settle());
+  EXPECT_TRUE(drive.graph.is_settled());
+  const Pose circle = drive.graph.T_world_lidar({1}).inverse() * drive.graph.T_world_lidar({38});
+  EXPECT_LT(circle.translation().norm(), 0.1);
+}
+
+TEST(KeyframeGraph, ALoopThatContradictsTheOthersLosesItsWeight) {
+  OutAndBack drive;
+  for (const int query : {28, 30, 32, 34, 36, 38}) drive.graph.add_loop(OutAndBack::loop(query));
+  LoopConstraint wrong = OutAndBack::loop(30);
+  wrong.T_match_query = planar_pose(7.0, 0.0, 0.0);
+  drive.graph.add_loop(wrong);
+  ASSERT_TRUE(drive.graph.settle());
+  const Pose circle = drive.graph.T_world_lidar({1}).inverse() * drive.graph.T_world_lidar({38});
+  EXPECT_LT(circle.translation().norm(), 0.1);
+}
+
+// A loop of an earlier run joins the parts as it did; its key frames are moved unless they lie there already.
+TEST(KeyframeGraph, ARestoredLoopMovesWhatIsNotPlaced) {
+  for (const bool is_placed : {true, false}) {
+    OutAndBack drive;
+    drive.graph.add_keyframe({100}, {.segment = 1}, KeyframeGraph::OdometryEdge{}, planar_pose(500, 0, 2));
+    LoopConstraint loop = OutAndBack::loop(0);
+    loop.match = {3};
+    loop.query = {100};
+    drive.graph.restore_loop(loop, is_placed);
+    EXPECT_EQ(drive.graph.part({100}), 0);
+    const Pose T = is_placed ? planar_pose(500, 0, 2) : drive.graph.T_world_lidar({3}) * loop.T_match_query;
+    EXPECT_TRUE(drive.graph.T_world_lidar({100}).isApprox(T, 1e-9)) << is_placed;
+  }
+}
+
 TEST(KeyframeGraph, FixesPlaceThePartsOnTheEarth) {
   OutAndBack drive;
   const Pose T_earth_world = planar_pose(1000, -300, 0.7);

@@ -96,9 +96,20 @@ TEST(LoopGate, AloneOnlyTheSureEnter) {
   const auto passed = gate.decide_overdue();
   ASSERT_EQ(passed.size(), 1u) << "the newest key frame is only 9 m beyond the second one";
   EXPECT_TRUE(passed[0].enters);
+  EXPECT_EQ(passed[0].agreeing, 0u);
   const auto rest = gate.decide_all();
   ASSERT_EQ(rest.size(), 1u);
   EXPECT_FALSE(rest[0].enters);
+}
+
+// Loops that were followed backwards come after newer ones.
+TEST(LoopGate, AnOlderLoopIsDueBeforeANewerOneThatWaitsLonger) {
+  LoopGate gate = gate_of_two_visits();
+  EXPECT_TRUE(gate.offer(loop(1090, 90, 0.2, 0.98)).empty());
+  EXPECT_TRUE(gate.offer(loop(1010, 10, 0.2, 0.9995)).empty());
+  const auto passed = gate.decide_overdue();
+  ASSERT_EQ(passed.size(), 1u);
+  EXPECT_EQ(passed[0].loop.query, FrameId{1010});
 }
 
 TEST(LoopGate, SureOfItselfButAgainstTheOthers) {

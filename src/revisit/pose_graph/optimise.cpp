@@ -103,7 +103,6 @@ double weight_at(double error, double mu) {
   const double low = mu / (mu + 1.0), high = (mu + 1.0) / mu;
   return error <= low ? 1.0 : error >= high ? 0.0 : std::sqrt(mu * (mu + 1.0) / error) - mu;
 }
-bool is_decided(double error, double mu) { return error <= mu / (mu + 1.0) || error >= (mu + 1.0) / mu; }
 
 }  // namespace
 
@@ -166,7 +165,7 @@ Result<PoseGraph::Report> PoseGraph::optimise(double settled) {
       bool all_decided = true;
       for_each_doubtful([&](double& weight, double error) {
         weight = weight_at(error, mu);
-        all_decided = all_decided && is_decided(error, mu);
+        all_decided = all_decided && (weight == 0.0 || weight == 1.0);
       });
       if (all_decided) break;
       if (const Status status = solve_all(kIterationsARound); !status) return status.error();

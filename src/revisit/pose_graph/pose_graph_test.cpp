@@ -98,6 +98,26 @@ TEST(PoseGraph, ThirtyPercentWrongLoopsDoNotBendIt) {
     }
 }
 
+TEST(PoseGraph, WhatWasRefusedIsNotTriedAgain) {
+  Rounds rounds;
+  rounds.add_right_loops();
+  rounds.add_wrong_loops(9);
+  const auto first = rounds.graph.optimise();
+  const auto again = rounds.graph.optimise();
+  ASSERT_TRUE(first && again);
+  EXPECT_EQ(again->loops_refused, 9u);
+  EXPECT_LE(again->iterations, 6) << "of " << first->iterations << " the first time";
+}
+
+TEST(PoseGraph, TwoNodesAreMovedToo) {
+  PoseGraph graph;
+  graph.add_node(Pose::Identity());
+  graph.add_node(Pose::Identity());
+  graph.add_edge({0, 1, planar_pose(3.0, 1.0, 0.5)});
+  ASSERT_TRUE(graph.optimise());
+  EXPECT_TRUE(graph.nodes()[1].isApprox(planar_pose(3.0, 1.0, 0.5), 1e-6));
+}
+
 TEST(PoseGraph, OneMoreLoopStartsFromWhereItWas) {
   Rounds rounds;
   rounds.add_right_loops();

@@ -23,7 +23,8 @@ FixPairs fixes_of(const std::vector<Eigen::Vector3d>& way, const Pose& T, double
 
 std::vector<Eigen::Vector3d> straight_way(std::size_t count = 40) {
   std::vector<Eigen::Vector3d> way;
-  for (std::size_t i = 0; i < count; ++i) way.emplace_back(5.6 * static_cast<double>(i), 3.0 - 4.2 * static_cast<double>(i), 0.0);
+  for (std::size_t i = 0; i < count; ++i)
+    way.emplace_back(5.6 * static_cast<double>(i), 3.0 - 4.2 * static_cast<double>(i), 0.0);
   return way;
 }
 
