@@ -20,7 +20,8 @@ struct Staying {
 };
 
 struct Waking {
-  static constexpr double kOneView_log_odds = 2.0;  ///< what a scan counts at most that does not decide alone
+  // What a scan counts at most that does not decide alone. A corridor looks the same for longer than a street.
+  static constexpr double kOneView_log_odds = 2.0, kOneViewOfRooms_log_odds = 1.0;
 };
 
 struct Expecting {
@@ -85,11 +86,11 @@ Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const Trajecto
   for (const Detection::Registered& each : detection->registered) {
     const Pose T_map_lidar = map_.T_map_lidar(each.match) * each.evidence.T_match_query;
     const int part = map_.part(each.match);
-    const double log_odds = each.evidence.decides_alone()
-                                ? each.evidence.own_log_odds
-                                : std::min(each.evidence.own_log_odds, Waking::kOneView_log_odds);
-    sightings.push_back({each.match, part, T_map_lidar, log_odds, expectation_log_odds(T_map_lidar, part, point),
-                         each.evidence.evidence.in_the_open});
+    const bool in_the_open = each.evidence.evidence.in_the_open;
+    const double most = in_the_open ? Waking::kOneView_log_odds : Waking::kOneViewOfRooms_log_odds;
+    const double own = each.evidence.own_log_odds, log_odds = each.evidence.decides_alone() ? own : std::min(own, most);
+    sightings.push_back(
+        {each.match, part, T_map_lidar, log_odds, expectation_log_odds(T_map_lidar, part, point), in_the_open});
   }
   belief_.add(point, sightings);
   Localisation result;
