@@ -157,10 +157,12 @@ Result<std::unique_ptr<Recording>> open_input(const std::string& input, const Re
 
 void use_frames_alone_without_times(const Recording& recording, Parameters& parameters) {
   if (recording.has_times()) return;
-  print_log()(LogLevel::kInfo,
-              "the recording has no times: 0.1 s a frame is assumed for the motion, and places fewer than " +
-                  std::to_string(parameters.retrieval.exclude_frames) +
-                  " frames before a scan are not searched, whatever their time");
+  print_log()(
+      LogLevel::kInfo,
+      "the recording has no times: 0.1 s a frame is assumed for the motion (where scans lie farther apart, a times.txt "
+      "of seconds, a line a scan, finds more loops), and places fewer than " +
+          std::to_string(parameters.retrieval.exclude_frames) +
+          " frames before a scan are not searched, whatever their time");
   parameters.retrieval.exclude_s = 0.0;
 }
 

@@ -17,14 +17,14 @@ class FollowingTrust {
   FollowingTrust after(double own_log_odds, double travelled_m) const {
     const double view = std::clamp(travelled_m / PoseBelief::kAnotherView_m, 0.0, 1.0);
     FollowingTrust next;
-    next.log_odds_ = std::min(kMost, log_odds_ + view * std::clamp(own_log_odds - kAsked, -kOneView, kOneView));
+    next.log_odds_ =
+        std::min(kMost, log_odds_ + view * std::clamp(own_log_odds - PoseBelief::kAskedInRooms, -kOneView, kOneView));
     return next;
   }
   bool is_gone() const { return log_odds_ < 0.0; }
 
  private:
   static constexpr double kMost = 6.0, kOneView = 2.0;  ///< log odds: in all, and what one view adds or takes
-  static constexpr double kAsked = 1.0;                 ///< in the mean over the way
   double log_odds_ = kOneView;                          ///< of a robot that has just woken up
 };
 

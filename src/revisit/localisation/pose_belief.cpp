@@ -8,15 +8,22 @@ namespace revisit {
 namespace {
 
 struct Adding {
-  static constexpr double kMetresARadian = 3.0;  ///< a turn shows as much anew as so many metres
-  static constexpr double kMost = 6.0;           ///< log odds that one view adds, either way
-  static constexpr double kNotSeenAgain = -1.0;  ///< for a view that does not confirm it
-  static constexpr double kForgotten = -12.0;    ///< log odds
+  static constexpr double kMetresARadian = 3.0;                     ///< a turn shows as much anew as so many metres
+  static constexpr double kMost = 6.0;                              ///< log odds that one view adds, either way
+  static constexpr double kNotAlone = 2.0, kNotAloneInRooms = 1.0;  ///< and one that does not decide alone
+  static constexpr double kNotSeenAgain = -1.0;                     ///< for a view that does not confirm it
+  static constexpr double kForgotten = -12.0;                       ///< log odds
   // Two poses are the same within this, and so much more for what was travelled in between.
   static constexpr double kSame_m = 0.5, kSame_mAMetre = 0.02, kSame_deg = 3.0;
 };
 
 }  // namespace
+
+double PoseBelief::log_odds_of_view(double own_log_odds, bool decides_alone, bool in_the_open) {
+  if (decides_alone) return own_log_odds;
+  return in_the_open ? std::min(own_log_odds, Adding::kNotAlone)
+                     : std::min(own_log_odds - kAskedInRooms, Adding::kNotAloneInRooms);
+}
 
 void PoseBelief::add(const TrajectoryPoint& point, std::span<const Sighting> sightings) {
   if (last_ && last_->segment != point.segment) {

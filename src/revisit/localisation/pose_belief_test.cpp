@@ -115,5 +115,14 @@ TEST(PoseBelief, AnotherSegmentBeginsAnew) {
   EXPECT_FALSE(drive.belief.best());
 }
 
+TEST(PoseBelief, AViewThatDoesNotDecideAloneCountsLittle) {
+  for (const bool in_the_open : {true, false}) EXPECT_EQ(PoseBelief::log_odds_of_view(7.0, true, in_the_open), 7.0);
+  EXPECT_EQ(PoseBelief::log_odds_of_view(5.0, false, true), 2.0);
+  EXPECT_EQ(PoseBelief::log_odds_of_view(1.5, false, true), 1.5);
+  EXPECT_EQ(PoseBelief::log_odds_of_view(5.0, false, false), 1.0);
+  EXPECT_EQ(PoseBelief::log_odds_of_view(1.5, false, false), 0.5) << "rooms are alike";
+  EXPECT_EQ(PoseBelief::log_odds_of_view(-3.0, false, false), -4.0);
+}
+
 }  // namespace
 }  // namespace revisit

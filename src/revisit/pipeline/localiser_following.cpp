@@ -19,11 +19,6 @@ struct Staying {
   static constexpr double kDrift = 0.01;  ///< of odometry, a standard deviation for each metre
 };
 
-struct Waking {
-  // What a scan counts at most that does not decide alone. A corridor looks the same for longer than a street.
-  static constexpr double kOneView_log_odds = 2.0, kOneViewOfRooms_log_odds = 1.0;
-};
-
 struct Expecting {
   static constexpr double kNear_m = 4.0, kNear_deg = 40.0;  ///< by hand, on a picture of the map
   static constexpr double kDrive_m = 20.0;                  ///< for which it is remembered
@@ -87,8 +82,8 @@ Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const Trajecto
     const Pose T_map_lidar = map_.T_map_lidar(each.match) * each.evidence.T_match_query;
     const int part = map_.part(each.match);
     const bool in_the_open = each.evidence.evidence.in_the_open;
-    const double most = in_the_open ? Waking::kOneView_log_odds : Waking::kOneViewOfRooms_log_odds;
-    const double own = each.evidence.own_log_odds, log_odds = each.evidence.decides_alone() ? own : std::min(own, most);
+    const double log_odds =
+        PoseBelief::log_odds_of_view(each.evidence.own_log_odds, each.evidence.decides_alone(), in_the_open);
     sightings.push_back(
         {each.match, part, T_map_lidar, log_odds, expectation_log_odds(T_map_lidar, part, point), in_the_open});
   }
