@@ -175,6 +175,24 @@ TEST(KeyframeGraph, FixesPlaceThePartsOnTheEarth) {
       << "odometry alone says 19.95";
 }
 
+TEST(KeyframeGraph, FixesPlaceALaterPartToo) {
+  OutAndBack drive;
+  TrajectoryPoint point{.segment = 1};
+  std::vector<KeyframeGraph::Fix> fixes;
+  for (int i = 0; i < 20; ++i) {
+    drive.graph.add_keyframe({100 + i}, point, KeyframeGraph::OdometryEdge{planar_pose(1, 0, 0), Matrix6::Identity()},
+                             i == 0 ? std::optional(planar_pose(500, 0, 2)) : std::nullopt);
+    point = point.after(planar_pose(1, 0, 0));
+    fixes.push_back({{100 + i}, planar_pose(200 + i, 40, 0).translation(), Eigen::Vector3d::Constant(0.1)});
+  }
+  const auto placed = drive.graph.settle_on_earth(fixes, {});
+  ASSERT_TRUE(placed) << placed.error().message;
+  ASSERT_EQ(placed->size(), 1u);
+  ASSERT_TRUE(placed->contains(1)) << "part 0 has no fix";
+  const Pose T = placed->at(1) * drive.graph.T_world_lidar({119});
+  EXPECT_LT((T.translation() - Eigen::Vector3d(219, 40, 0)).norm(), 0.5);
+}
+
 // Two sessions along one level road, 1 m a key frame, whose odometry pitches evenly; each has its accelerometer, which
 // is off by its own. Gravity takes the drift out of the height, and neither offset bends the road.
 TEST(KeyframeGraph, GravityOfTwoSessions) {

@@ -85,8 +85,8 @@ TEST(PoseGraph, LoopsTakeTheDriftAway) {
 TEST(PoseGraph, ThirtyPercentWrongLoopsDoNotBendIt) {
   Rounds right, mixed;
   right.add_right_loops();
-  mixed.add_right_loops();
   mixed.add_wrong_loops(9);  // of 29
+  mixed.add_right_loops();
   ASSERT_TRUE(right.graph.optimise());
   const auto report = mixed.graph.optimise();
   ASSERT_TRUE(report) << report.error().message;
