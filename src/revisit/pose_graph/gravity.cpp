@@ -9,8 +9,12 @@
 
 #include <Eigen/LU>
 
+#include <revisit/pose_graph/internal/median.hpp>
+
 namespace revisit {
 namespace {
+
+using pose_graph_internal::median;
 
 struct Weighing {
   static constexpr int kRounds = 20;  ///< until both settle: where up is, and how much the sensor is off
@@ -22,12 +26,6 @@ struct Weighing {
 };
 
 using Vectors = std::vector<Eigen::Vector3d>;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // How far readings of one sensor are from what they have in common, in the world. Those that are far off count little.
 Vectors errors_of(const PoseGraph& graph, const std::vector<const UpReading*>& readings) {

@@ -6,6 +6,7 @@
 
 #include <Eigen/SVD>
 
+#include <revisit/pose_graph/internal/median.hpp>
 #include <revisit/pose_graph/internal/rough_place.hpp>
 
 namespace revisit::pose_graph_internal {
@@ -55,11 +56,6 @@ std::pair<double, double> spread_m(const std::vector<Eigen::Vector3d>& points) {
   const Eigen::Vector3d values =
       Eigen::JacobiSVD<Eigen::Matrix3d>(squares / static_cast<double>(points.size())).singularValues();
   return {std::sqrt(values[1]), std::sqrt(values[0])};
-}
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
 }
 
 // How far off each fix is, in its deviations, if the part lies so.
