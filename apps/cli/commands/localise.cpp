@@ -163,7 +163,7 @@ Run add_localise(CLI::App& program) {
       "A scan is looked for in the whole map, without a prior: its pose is printed, or why it is not found (exit code "
       "3).\n"
       "A sensor that looks one way (less than half round) needs a drive of some metres in streets, and any sensor\n"
-      "often needs up to 18 m in rooms: others look alike.\n"
+      "often needs 15 m and more in rooms: others look alike.\n"
       "A recording is found the same way, then followed; where it gets lost it is found again. Into the folder of "
       "--out:\n"
       "  localisation.csv  a row a scan: status (found, followed, predicted, lost), pose in the map, probability\n"

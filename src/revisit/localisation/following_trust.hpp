@@ -8,8 +8,9 @@
 namespace revisit {
 
 /// Whether a robot that is followed through rooms of a map is still believed to be where it is followed. If it woke up
-/// in a look-alike, the next scans can be registered there, but each alone speaks against the place: their log odds are
-/// added up, and below 0 the robot is lost. A value: safe to copy and to read from several threads.
+/// in a look-alike, the next scans can be registered there, but fit less well than in the right place: what each view
+/// has beyond log odds of PoseBelief::kAskedInRooms is added up, and below 0 the robot is lost. A value: safe to copy
+/// and to read from several threads.
 class FollowingTrust {
  public:
   /// After one more scan, registered where it was predicted. `own_log_odds` that the pose is right, by this scan alone;

@@ -15,11 +15,11 @@ namespace revisit {
 class PoseBelief {
  public:
   static constexpr double kAnotherView_m = 3.0;  ///< travelled, after which a scan is evidence of its own
+  static constexpr double kAskedInRooms = 1.0;   ///< log odds beyond which a view speaks for a room
 
-  static constexpr double kAskedInRooms = 1.0;  ///< log odds of each view beyond which it speaks for a room
-
-  /// What a view counts whose scan has `own_log_odds` by itself: all of it where it decides alone, else a part, since
-  /// what is seen next may look the same elsewhere, too; in rooms, which are alike for longer, less.
+  /// The log odds that a view adds to a pose, whose scan has `own_log_odds` there by itself: all of them where the scan
+  /// decides alone, else at most 2 in the open; in rooms, which look alike for longer, what is beyond kAskedInRooms, at
+  /// most 1.
   static double log_odds_of_view(double own_log_odds, bool decides_alone, bool in_the_open);
 
   /// A pose at which one scan was registered.

@@ -19,8 +19,9 @@ struct EarthFix {
 };
 
 /// Moves the nodes to where all edges and these fixes agree best; a fix that contradicts the rest loses its weight as a
-/// loop does. `part_of_node`: which part of the graph a node is in; parts that nothing joins are placed each by its own
-/// fixes. For each part, by its number, T_earth_world; nothing for those whose fixes do not fix a heading.
+/// loop does, and so do up to two fifths of the fixes that are wrong in one piece and agree with each other.
+/// `part_of_node`: which part of the graph a node is in; parts that nothing joins are placed each by its own fixes. For
+/// each part, by its number, T_earth_world; nothing for those whose fixes do not fix a heading.
 Result<std::vector<std::optional<Pose>>> settle_on_earth(PoseGraph& graph, std::span<const EarthFix> fixes,
                                                          std::span<const int> part_of_node);
 

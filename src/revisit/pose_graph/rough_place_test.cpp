@@ -73,7 +73,7 @@ TEST(RoughPlace, ABentWayTellsHowItLeans) {
     }
 }
 
-// 49 of 100 may say the same of another place; just the others speak for it.
+// 29 of 60 fixes agree with each other on another place, 80 m beside.
 TEST(RoughPlace, NearlyHalfOfTheFixesMayAgreeElsewhere) {
   const Pose T = somewhere(1.0, 0.1);
   FixPairs pairs = fixes_of(bent_way(), T, 0.5);
