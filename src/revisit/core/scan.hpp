@@ -37,9 +37,10 @@ struct Scan {
   std::vector<ImuSample> imu = {};     ///< from before the sweep to its end, increasing times; may be empty
   /// Which way is up, a unit vector in the frame of the points, where something knows it (a mounting, gravity).
   std::optional<Eigen::Vector3f> up = std::nullopt;
+  bool is_stamp_assumed = false;  ///< nothing says when it was taken: 0.1 s a frame
 
   void archive(auto& fields) {
-    fields(frame, stamp_s, points, rings, times_s, dropped_non_finite, dropped_at_origin, imu, up);
+    fields(frame, stamp_s, points, rings, times_s, dropped_non_finite, dropped_at_origin, imu, up, is_stamp_assumed);
     const auto fits = [&](std::size_t size) { return size == 0 || size == points.size(); };
     fields.require(fits(rings.size()) && fits(times_s.size()));
   }

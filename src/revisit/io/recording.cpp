@@ -59,6 +59,7 @@ class FolderRecording final : public Recording {
         return status.error();
     scan->frame = scans_[index].frame;
     scan->stamp_s = scans_[index].stamp_s;
+    scan->is_stamp_assumed = !has_times_;
     return scan;
   }
 

@@ -82,6 +82,7 @@ TEST(Recording, TimesAndPosesStandInAFolderOfScansOrBesideIt) {
   write(scans, "4");
   recording = open_recording(scans);
   EXPECT_DOUBLE_EQ((*recording)->stamp_s(0), 40.5) << "those inside come first";
+  EXPECT_FALSE((*recording)->read(0)->is_stamp_assumed);
   fs::remove(scans / "times.txt");
   fs::remove(scans / "poses.txt");
   std::ofstream(folder / "times.txt") << "1\n";
@@ -89,6 +90,7 @@ TEST(Recording, TimesAndPosesStandInAFolderOfScansOrBesideIt) {
   recording = open_recording(scans, [&](LogLevel, const std::string& message) { warning = message; });
   ASSERT_TRUE(recording) << "what stands beside may belong to something else";
   EXPECT_FALSE((*recording)->has_times());
+  EXPECT_TRUE((*recording)->read(0)->is_stamp_assumed);
   EXPECT_NE(warning.find("needs row 8"), std::string::npos) << warning;
 }
 

@@ -95,6 +95,7 @@ OdometryStep Odometry::match(const Scan& scan, double stamp_s, const std::option
   const auto T_guess = T_previous_lidar ? T_previous_lidar : motion_by_imu(stamp_s);
   using Search = ScanMatcher::Search;
   MatcherScan thinned = matcher_.thinned(step.compensated.empty() ? scan.points : step.compensated);
+  thinned.is_stamp_assumed = scan.is_stamp_assumed || scan.stamp_s < stamp_s;
   ScanMatch match;
   // Before a scan is looked for elsewhere, its sweep is compensated again with the motion that was found, and matched
   // from there: that match measures how far it slides from where it was found first, not from the prediction.
@@ -105,6 +106,7 @@ OdometryStep Odometry::match(const Scan& scan, double stamp_s, const std::option
       std::vector<Point> again = compensated(scan, found);
       if (first_scan_) begin_map_again(found);
       MatcherScan thinned_again = matcher_.thinned(again);
+      thinned_again.is_stamp_assumed = thinned.is_stamp_assumed;
       const ScanMatch matched_again = matcher_.match_again(stamp_s, thinned_again, match, search);
       if (matched_again.is_tracked) {
         match = matched_again;

@@ -123,6 +123,43 @@ TEST(Odometry, StampsThatStandStillAreReplacedAndSaid) {
   EXPECT_NEAR(step.stamp_s, 0.1, 1e-12);
 }
 
+// A corridor with few door frames: what hardly fixes a step cannot make it leap, unless the time that passed is not
+// known.
+std::vector<Point> corridor_from(double x_m) {
+  std::vector<Point> points;
+  const auto x0 = static_cast<float>(x_m);
+  for (float x = -15.f; x < 15.f; x += 0.1f)
+    for (float z = -1.f; z < 1.5f; z += 0.25f)
+      for (const float y : {-1.5f, 1.5f}) points.push_back({x, y, z, 0.f});
+  for (float x = -15.f; x < 15.f; x += 0.3f)
+    for (float y = -1.4f; y < 1.5f; y += 0.2f) points.push_back({x, y, -1.f, 0.f});
+  for (const float frame_m : {-9.f, -2.f, 7.f})
+    for (float y = 0.9f; y < 1.5f; y += 0.05f)
+      for (float z = -1.f; z < 1.5f; z += 0.1f) points.push_back({frame_m - x0, y, z, 0.f});
+  return points;
+}
+
+TEST(Odometry, WhatHardlyFixesAStepCannotMakeItLeapWhereTimesAreKnown) {
+  struct Stamps {
+    double period_s;
+    bool are_assumed;
+  };
+  for (const auto& [period_s, are_assumed] : {Stamps{kPeriod_s, false}, Stamps{kPeriod_s, true}, Stamps{0.0, false}}) {
+    Odometry odometry;
+    OdometryStep step;
+    for (int i = 0; i < 9; ++i) {
+      Scan scan;
+      scan.points = corridor_from(i < 8 ? 0.0 : 0.5);
+      scan.stamp_s = period_s * i;
+      scan.is_stamp_assumed = are_assumed;
+      step = odometry.follow(scan);
+    }
+    const bool are_known = period_s > 0.0 && !are_assumed;
+    EXPECT_EQ(step.is_tracked && step.T_previous_lidar.translation().norm() > 0.3, !are_known)
+        << "period " << period_s << " s: " << step.T_previous_lidar.translation().transpose();
+  }
+}
+
 // Poses made from poses, scan after scan, with inverses in between: rounding must not grow.
 TEST(Odometry, ALongExternalOdometryStaysARotation) {
   Odometry odometry(Odometry::Source::kExternal);

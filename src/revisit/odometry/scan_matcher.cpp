@@ -54,7 +54,8 @@ struct Matching {
   // Beside what is new: share of all points and of those that meet something; and share of all that was seen through.
   static constexpr double kFewestBesideNew = 0.15, kFittingBesideNew = 0.7, kMostContradicted = 0.06;
 
-  static constexpr double kLongestGap_s = 1.0;  ///< beyond, the motion before says nothing about the motion now
+  static constexpr double kLongestAssumed = 5.0;  ///< that times may be apart, of what is assumed where there are none
+  static constexpr double kLongestGap_s = 1.0;    ///< beyond, the motion before says nothing about the motion now
   static constexpr double kLongestExtrapolation_s = 5.0;  ///< and is still a better guess than none
 };
 
@@ -189,7 +190,7 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
   const double gap_s = stamp_s - last_stamp_s_;
   const bool follows = gap_s > 0.0 && gap_s <= Matching::kLongestGap_s;
   // Since the last scan that was tracked: the longer ago, the farther may the sensor be from where it was predicted.
-  const double untracked_s = stamp_s - tracked_stamp_s_;
+  const double untracked_s = (stamp_s - tracked_stamp_s_) * (scan.is_stamp_assumed ? Matching::kLongestAssumed : 1.0);
   const MotionLimits limits(T_odom_lidar_ * T_predicted, untracked_s);
   const auto is_possible = [&](const IcpResult& icp) {
     // Wheels slip, but not like this: it is the surroundings that move along with the sensor.

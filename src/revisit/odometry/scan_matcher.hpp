@@ -20,6 +20,7 @@ struct MatcherScan {
   std::vector<Eigen::Vector3f> points;      ///< one a voxel of the map: what is matched
   std::vector<Eigen::Vector3f> map_points;  ///< eight a voxel at most: what enters the map
   double voxel_m = 1.0, range_m = 10.0;     ///< edge of a voxel; the median range
+  bool is_stamp_assumed = false;            ///< it may have been taken longer after the one before than its stamp says
 };
 
 /// Where one scan was matched.
