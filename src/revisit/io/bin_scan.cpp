@@ -71,18 +71,32 @@ double roughness(const std::string& bytes, std::size_t floats) {
   return sum;
 }
 
+// Whether records of 8 floats are two points each: of two beams that a sensor fires one after the other, which may
+// point far up and down, but much the same way. Anything else (a normal, a time) is of another size or points
+// elsewhere.
+bool are_two_points(const std::string& bytes) {
+  constexpr float kMostTimesAsFar = 10.f, kLeastCosine = 0.85f;  // 30 degrees, seen from above
+  return share_of_records(bytes, 2 * kKittiBytes, [](const char* record) {
+           const auto first = load<Point>(record), second = load<Point>(record + kKittiBytes);
+           const float first_m = std::hypot(first.x, first.y), second_m = std::hypot(second.x, second.y);
+           return first_m <= kMostTimesAsFar * second_m && second_m <= kMostTimesAsFar * first_m &&
+                  first.x * second.x + first.y * second.y >= kLeastCosine * first_m * second_m;
+         }) > 0.8;
+}
+
 // The number of floats a record, of those that divide the file, whose columns are smoothest; 4 unless another is
 // clearly smoother (points in random order are rough in any width).
 std::size_t likely_floats_per_record(const std::string& bytes) {
+  constexpr double kRandomOrder = 4.0;  // of three columns, 4/3 each
   std::size_t best = 4;
-  double least = bytes.size() % kKittiBytes == 0 ? 0.7 * roughness(bytes, 4) : std::numeric_limits<double>::infinity();
+  double least = bytes.size() % kKittiBytes == 0 ? 0.7 * std::min(kRandomOrder, roughness(bytes, 4))
+                                                 : std::numeric_limits<double>::infinity();
   for (const std::size_t floats : {3u, 5u, 6u, 7u, 8u}) {
     if (bytes.size() % (floats * sizeof(float)) != 0) continue;
     const double here = roughness(bytes, floats);
-    if (here < least) {
-      least = here;
-      best = floats;
-    }
+    if (here >= least || (floats == 8 && are_two_points(bytes))) continue;
+    least = here;
+    best = floats;
   }
   return best;
 }

@@ -79,12 +79,14 @@ std::string records(int floats) {
   std::string bytes;
   for (int i = 0; i < 4000; ++i) {
     const float angle = 0.0063f * static_cast<float>(i % 1000), range = 10.f + 3.f * std::sin(3.f * angle);
-    const float values[6] = {range * std::cos(angle),
+    const float values[8] = {range * std::cos(angle),
                              range * std::sin(angle),
                              -1.f + 0.5f * static_cast<float>(i / 1000),
                              0.3f + 0.1f * std::sin(40.f * angle),
                              0.0001f * static_cast<float>(i) + 0.05f,
-                             1.f};
+                             1.f,
+                             std::cos(angle),
+                             std::sin(angle)};
     for (int k = 0; k < floats; ++k) append(bytes, values[k]);
   }
   return bytes;
@@ -92,13 +94,28 @@ std::string records(int floats) {
 
 TEST(ReadBin, RecordsOfAnotherWidthAreNotReadAsRubbish) {
   EXPECT_TRUE(read_scan(write_file("4.bin", records(4))));
-  for (const int floats : {3, 5, 6}) {
+  for (const int floats : {3, 5, 6, 8}) {
     const auto scan = read_scan(write_file("wide.bin", records(floats)));
     ASSERT_FALSE(scan) << floats;
     EXPECT_NE(scan.error().message.find("looks like records of " + std::to_string(floats) + " floats"),
               std::string::npos)
         << scan.error().message;
   }
+}
+
+// Beams that follow one another may see the ground and a wall: then every other point lies nearer than the next.
+TEST(ReadBin, BeamsThatPointApartAreStillFourFloats) {
+  std::string bytes;
+  for (int i = 0; i < 4000; ++i) {
+    const bool is_low = i % 2 == 0;
+    const float angle = 0.00157f * static_cast<float>(i), range = is_low ? 3.f : 12.f;
+    for (const float value :
+         {range * std::cos(angle), range * std::sin(angle), is_low ? -1.f : 1.f, is_low ? 0.2f : 0.6f})
+      append(bytes, value);
+  }
+  const auto scan = read_scan(write_file("a.bin", bytes));
+  ASSERT_TRUE(scan) << scan.error().message;
+  EXPECT_EQ(scan->points.size(), 4000u);
 }
 
 TEST(ReadBin, PointsAllAlikeAreStillFourFloats) {
