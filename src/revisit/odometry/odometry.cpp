@@ -12,7 +12,7 @@ namespace {
 struct Following {
   static constexpr int kLostAfter_scans = 5;       ///< without track: what is predicted on is worth nothing any more
   static constexpr double kLostAfter_s = 5.0;      ///< between two scans, of which the second is not tracked
-  static constexpr double kLongestGap_s = 1.0;     ///< between two scans; beyond, their motion says nothing of a sweep
+  static constexpr double kLongestGap_s = 2.0;     ///< between two scans; beyond, their motion says nothing of a sweep
   static constexpr double kTypicalPeriod_s = 0.1;  ///< where stamps do not increase
   /// Prediction error beyond which a sweep was compensated wrongly, and is once more with the motion that was found.
   static constexpr double kWrong_m = 0.1;

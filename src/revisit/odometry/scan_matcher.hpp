@@ -12,6 +12,7 @@
 #include <revisit/core/twist.hpp>
 #include <revisit/odometry/last_view.hpp>
 #include <revisit/odometry/local_map.hpp>
+#include <revisit/registration/icp.hpp>
 
 namespace revisit {
 
@@ -30,6 +31,7 @@ struct ScanMatch {
   Pose T_previous_found = Pose::Identity();  ///< the same as registration has it, believed or not
   Matrix6 information = Matrix6::Zero();     ///< of T_previous_lidar, as in LoopConstraint
   double matched = 0.0;                      ///< share of the scan's points that lie on a surface of the map
+  double matched_sideways = 0.0;             ///< the same of what stands upright alone (IcpResult)
   double met = 0.0;                          ///< share with a surface of the map nearby at all
   double prediction_error_m = 0.0;           ///< of a point at the median range
   std::optional<double> measured_m;          ///< what wheels say the sensor moved
@@ -82,7 +84,7 @@ class ScanMatcher {
     if (has_map && !map_) map_ = std::make_unique<LocalMap>(1.0, 1.0);  // of whatever size the archive says
     if (has_map) fields(*map_);
     fields(T_odom_lidar_, motion_, forgotten_from_, last_stamp_s_, range_m_, untracked_m_, T_odom_tracked_,
-           tracked_stamp_s_, squared_prediction_error_m2_, typical_match_, scans_, rings_, last_view_);
+           tracked_stamp_s_, squared_prediction_error_m2_, typical_match_, last_sideways_, scans_, rings_, last_view_);
   }
 
   bool has_map() const { return map_ != nullptr; }
@@ -94,7 +96,7 @@ class ScanMatcher {
                          std::optional<double> measured_m, Search search) const;
   double fine_m() const;
   double search_radius_m() const;
-  bool is_credible(double matched, double met, bool is_predicted) const;
+  bool is_credible(const IcpResult& icp, bool is_predicted) const;
 
   std::unique_ptr<LocalMap> map_;
   std::unique_ptr<Insertion> insertion_;  ///< of the last scan into the map; waited for before the map is read
@@ -107,6 +109,7 @@ class ScanMatcher {
   double tracked_stamp_s_ = 0.0;              ///< of the last scan that was tracked
   double squared_prediction_error_m2_ = 0.0;  ///< running mean
   double typical_match_ = 0.0;                ///< running mean of the share that met the map
+  double last_sideways_ = 0.0;                ///< matched_sideways of the last scan that was tracked
   int scans_ = 0;                             ///< in the map
   std::uint32_t rings_ = 0;
   LastView last_view_;  ///< of the last scan that was tracked

@@ -128,6 +128,34 @@ TEST(ScanMatcher, WhatScansDoNotFixIsTakenFromWheels) {
   EXPECT_LT(std::abs(T_found.translation().y()), 0.1);
 }
 
+// The ground fits wherever a car went: a scan that shows it alone says nothing, and is not tracked.
+TEST(ScanMatcher, TheGroundAloneIsNoMatch) {
+  ScanMatcher matcher;
+  for (int i = 0; i < 8; ++i) track(matcher, 0.1 * i, seen_from(31, pose_of(i), static_cast<unsigned>(i)));
+  std::vector<Point> points = seen_from(31, pose_of(8), 8);
+  const std::size_t all = points.size();
+  std::erase_if(points, [](const Point& p) { return p.z > -1.6f; });
+  ASSERT_GT(points.size(), all / 2) << "most of it is ground";
+  const ScanMatch step = matcher.match(0.8, matcher.thinned(points));
+  EXPECT_GT(step.matched, 0.5);
+  EXPECT_FALSE(step.is_tracked);
+}
+
+// Twice a second at 12 m/s, from the first scan on, then a turn that the motion before does not tell.
+TEST(ScanMatcher, FollowsACarTwiceASecond) {
+  ScanMatcher matcher;
+  const SyntheticWorld world(31, 45.0, 150);
+  Pose T_world_lidar = SyntheticWorld::at(-30.0, 0.0, 0.0);
+  const Pose T_world_odom = T_world_lidar;
+  for (int i = 0; i < 9; ++i) {
+    const ScanMatch step = track(matcher, 0.5 * i, world.scan(T_world_lidar, {64, 600, -24.8, 5.0}, 1).points);
+    EXPECT_TRUE(step.is_tracked) << "scan " << i;
+    const Pose error = (T_world_odom.inverse() * T_world_lidar).inverse() * step.T_odom_lidar;
+    EXPECT_LT(error.translation().norm(), 0.3) << "scan " << i;
+    T_world_lidar = T_world_lidar * planar_pose(6.0, 0.0, to_radians(i < 2 ? 0.0 : i % 2 == 0 ? 20.0 : -20.0));
+  }
+}
+
 // 70 degrees wide, it turns by 12 degrees a scan: soon nothing of what it sees was in its first view.
 TEST(ScanMatcher, FollowsANarrowSensorThatTurns) {
   ScanMatcher matcher;
