@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <map>
 #include <memory>
 #include <optional>
@@ -21,8 +22,10 @@ struct Described {
   ThinCloud cloud;
 };
 
-inline Described described(const SyntheticWorld& world, const Pose& T_world_lidar) {
-  const Scan scan = world.scan(T_world_lidar, {32, 900, -24.8, 5.0});
+inline Described described(const SyntheticWorld& world, const Pose& T_world_lidar, double view_deg = 360.0) {
+  Scan scan = world.scan(T_world_lidar, {32, 900, -24.8, 5.0});
+  std::erase_if(scan.points,
+                [&](const Point& p) { return std::abs(std::atan2(p.y, p.x)) > to_radians(view_deg) / 2.0; });
   std::vector<std::uint8_t> ground;
   for (const Point& p : scan.points) ground.push_back(p.z < -1.6f);
   return {describe(scan.points, {}), thin_for_registration(scan.points, ground)};

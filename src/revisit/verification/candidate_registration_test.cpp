@@ -87,17 +87,23 @@ TEST_F(CandidateRegistrationTest, WhatOdometryKnowsToBeElsewhereIsNotRegistered)
 }
 
 TEST_F(CandidateRegistrationTest, WhereTrackWasLostInOneDriveOdometryNotKnowingSpeaksAgainstAPose) {
-  const auto log_odds = [&](bool is_one_drive, const std::optional<TrajectoryPoint>& point, FrameId frame) {
+  const auto log_odds = [&](bool is_one_drive, const std::optional<TrajectoryPoint>& point, FrameId frame,
+                            const Described& query, int place = 2) {
     VerificationContext known = context();
     known.is_one_drive = is_one_drive;
-    const VerificationQuery question{frame, query_.descriptor, query_.cloud, nullptr, point};
-    return CandidateRegistration(known, question).test(candidates(query_, {2}))->front().geometric->log_odds;
+    const VerificationQuery question{frame, query.descriptor, query.cloud, nullptr, point};
+    return CandidateRegistration(known, question).test(candidates(query, {place}))->front().geometric->log_odds;
   };
   const TrajectoryPoint lost{.segment = 9, .origin = 9};
-  const double usual = log_odds(false, lost, FrameId{1000});
-  EXPECT_NEAR(log_odds(true, lost, FrameId{1000}), usual - 3.0, 1e-9);
-  EXPECT_NEAR(log_odds(true, std::nullopt, FrameId{1000}), usual, 1e-9) << "a scan alone was never tracked";
-  EXPECT_NEAR(log_odds(true, lost, FrameId{(std::int64_t{1} << 40) + 5}), usual, 1e-9) << "another session";
+  const double usual = log_odds(false, lost, FrameId{1000}, query_);
+  EXPECT_NEAR(log_odds(true, lost, FrameId{1000}, query_), usual - 3.0, 1e-9);
+  EXPECT_NEAR(log_odds(true, std::nullopt, FrameId{1000}, query_), usual, 1e-9) << "a scan alone was never tracked";
+  EXPECT_NEAR(log_odds(true, lost, FrameId{(std::int64_t{1} << 40) + 5}, query_), usual, 1e-9) << "another session";
+  add(7, described(home_, SyntheticWorld::at(2.0, 0.0, 0.0), 120.0), points_.at(FrameId{2}));
+  const Described narrow = described(home_, SyntheticWorld::at(2.3, 0.4, 0.1), 120.0);
+  EXPECT_NEAR(log_odds(true, lost, FrameId{1000}, narrow, 7), log_odds(false, lost, FrameId{1000}, narrow, 7) - 6.0,
+              1e-9)
+      << "of a street a narrow sensor sees too little";
 }
 
 TEST_F(CandidateRegistrationTest, OfAPredictedPlaceOnlyThePoseIsOpen) {
