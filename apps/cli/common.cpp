@@ -159,11 +159,11 @@ void use_frames_alone_without_times(const Recording& recording, Parameters& para
   if (recording.has_times()) return;
   print_log()(
       LogLevel::kInfo,
-      "the recording has no times: 0.1 s a frame is assumed, and the motion may change as in half a second; places "
-      "fewer than " +
+      "the recording has no times: 0.1 s a frame is assumed, and odometry allows for scans half a second apart; "
+      "places fewer than " +
           std::to_string(parameters.retrieval.exclude_frames) +
-          " frames before a scan are not searched, whatever their time. A times.txt beside the scans (seconds, a line "
-          "a scan) says what both are meant to be");
+          " frames before a scan are not searched, whatever their time. If you know the times, put a times.txt beside "
+          "the scans: seconds, a line a scan");
   parameters.retrieval.exclude_s = 0.0;
 }
 

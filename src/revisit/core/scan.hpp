@@ -37,7 +37,7 @@ struct Scan {
   std::vector<ImuSample> imu = {};     ///< from before the sweep to its end, increasing times; may be empty
   /// Which way is up, a unit vector in the frame of the points, where something knows it (a mounting, gravity).
   std::optional<Eigen::Vector3f> up = std::nullopt;
-  bool is_stamp_assumed = false;  ///< nothing says when it was taken: 0.1 s a frame
+  bool is_stamp_assumed = false;  ///< no time is known: `stamp_s` counts 0.1 s a frame
 
   void archive(auto& fields) {
     fields(frame, stamp_s, points, rings, times_s, dropped_non_finite, dropped_at_origin, imu, up, is_stamp_assumed);

@@ -23,8 +23,8 @@ const double kYawMargin_rad = to_radians(3.0);
 // What a pose loses where odometry does not know how the two places lie to each other. In streets that are the same
 // tree for tree, wrong ones reach 3.2 by themselves (OS0-128 and rosette along 08, seed 304). With 3 less in rooms, 242
 // of a rosette's 349 loops on the storeys of a building were false; with 6 less none (docs/accuracy.md).
-// So it is where both are narrow, in the open too: of a rosette's five loops after it was lost (06, every third scan,
-// seed 1821) four were of another street.
+// With 3 less in the open, of the five loops of a rosette that had lost track (06, every third scan, seed 1821) four
+// were in another street: where both are narrow, 6 less everywhere.
 constexpr double kUnknownInTheOpen_log_odds = -3.0, kUnknownOtherwise_log_odds = -6.0;
 
 // Of the least overlap: a scan that comes alone has no other one beside it that may overlap more.
