@@ -54,8 +54,7 @@ class FolderRecording final : public Recording {
     auto scan = read_scan(file, remarks_->about(file));
     if (!scan) return scan;
     if (!point_values_.empty())
-      if (const Status status = io_internal::read_point_values(point_values_, scans_[index].file.filename(), *scan);
-          !status)
+      if (const Status status = io_internal::read_point_values(point_values_, file, *scan); !status)
         return status.error();
     scan->frame = scans_[index].frame;
     scan->stamp_s = scans_[index].stamp_s;

@@ -2,6 +2,7 @@
 #include <revisit/io/recording.hpp>
 
 #include <fstream>
+#include <limits>
 
 #include "shared_data.hpp"
 
@@ -202,6 +203,42 @@ TEST(Recording, BrokenSideFilesOfAKittiFolderAreErrors) {
   std::ofstream(folder / "times.txt") << "0\n0.1\n0.2\n0.3\n";
   std::ofstream(folder / "calib.txt") << "Tr: 1 0 0\n";
   EXPECT_NE(open_recording(folder).error().message.find("needs 12 numbers"), std::string::npos);
+}
+
+template <typename T>
+void write_values(const fs::path& file, const std::vector<T>& values) {
+  fs::create_directories(file.parent_path());
+  std::ofstream(file, std::ios::binary)
+      .write(reinterpret_cast<const char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(T)));
+}
+
+TEST(Recording, TimesAndRingsAreOfTheReturnsOrOfAllPoints) {
+  const fs::path folder = fresh_folder();
+  std::vector<Point> points;
+  std::vector<float> times_s;
+  for (int i = 0; i < 10; ++i) {
+    points.push_back({1.f, static_cast<float>(i), 0.f, 0.5f});
+    times_s.push_back(-0.01f * static_cast<float>(i));
+  }
+  points[3].y = std::numeric_limits<float>::quiet_NaN();
+  points[6] = {};
+  times_s[6] = 90.f;  // of nothing
+  write_values(folder / "velodyne" / "000000.bin", points);
+  write_values(folder / "velodyne_times" / "000000.bin", times_s);
+  write_values(folder / "velodyne_rings" / "000000.bin", std::vector<std::uint16_t>{0, 1, 2, 4, 5, 7, 8, 9});
+  const auto scan = (*open_recording(folder))->read(0);
+  ASSERT_TRUE(scan) << scan.error().message;
+  ASSERT_EQ(scan->points.size(), 8u);
+  ASSERT_EQ(scan->times_s.size(), 8u);
+  for (std::size_t i = 0; i < 8; ++i) {
+    EXPECT_FLOAT_EQ(scan->points[i].y, scan->rings[i]);
+    EXPECT_FLOAT_EQ(scan->times_s[i], -0.01f * scan->points[i].y);
+  }
+  times_s.resize(9);
+  write_values(folder / "velodyne_times" / "000000.bin", times_s);
+  const auto refused = (*open_recording(folder))->read(0);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("36 bytes; allowed: 40"), std::string::npos) << refused.error().message;
 }
 
 // The layout of KITTI is not its sensor.

@@ -37,7 +37,8 @@ struct Oxts {
 /// The rows of a KITTI raw `oxts` folder, by the number in the file's name.
 Result<std::map<FrameId, Oxts>> read_oxts(const std::filesystem::path& folder);
 
-/// Times and rings that stand beside a scan (`name` is its file's), where there are any.
-Status read_point_values(const std::filesystem::path& folder, const std::filesystem::path& name, Scan& scan);
+/// Times and rings that stand in `folder` beside the scan of that file, where there are any: one for each of the scan's
+/// points, or of the file's, of which some are no returns.
+Status read_point_values(const std::filesystem::path& folder, const std::filesystem::path& scan_file, Scan& scan);
 
 }  // namespace revisit::io_internal
