@@ -100,14 +100,45 @@ TEST_F(EitherView, ElseTheSearchIsOneOfAllPlaces) {
   expect_plain(narrow, seen(place(1, 7), kNarrowSectors), narrow.size());
 }
 
-// In a field a wide sensor sees little, too: one that ever sees all round is not narrow.
-TEST_F(EitherView, ASessionIsNarrowWhereItNeverSeesMore) {
+TEST_F(EitherView, ASessionBeginsWithItsFirstPlace) {
+  for (const int session : {1, 2}) {
+    const IntensityScanContext query = seen(place(session, 0), kNarrowSectors, session == 1 ? 0.3 : 0.5);
+    const auto found = *search_either_view(index_, query, index_.size(), options());
+    ASSERT_FALSE(of_session(found, session).empty());
+    EXPECT_EQ(of_session(found, session).front(), in_map(session, FrameId{0}));
+  }
+}
+
+TEST_F(EitherView, PlacesThatAreNotSearchedDoNotCount) {
+  PlaceIndex index(options());
+  for (const int session : {0, 1, 2})
+    for (int i = 0; i < kPlaces; ++i)
+      index.add(in_map(session, FrameId{i}), i + 100.0 * session,
+                seen(place(session, i), session < 2 ? kNarrowSectors : kSectors));
+  expect_plain(index, seen(place(1, 7), kNarrowSectors), 2 * kPlaces);
+}
+
+TEST_F(EitherView, AViewOfHalfOfAllDirectionsIsNotNarrow) {
+  const IntensityScanContext half = seen(place(1, 7), kSectors / 2);
+  ASSERT_EQ(seen_share(half), 0.5);
+  expect_plain(index_, half, index_.size());
   PlaceIndex index(options());
   for (int i = 0; i < kPlaces; ++i) index.add(in_map(0, FrameId{i}), i, seen(place(0, i), kNarrowSectors));
-  for (int i = 0; i < kPlaces; ++i)
-    index.add(in_map(1, FrameId{i}), 100.0 + i, seen(place(1, i), i == 20 ? kSectors : kNarrowSectors));
+  for (int i = 0; i < kPlaces; ++i) index.add(in_map(1, FrameId{i}), 100.0 + i, half);
   const auto found = *search_either_view(index, seen(place(1, 7), kNarrowSectors), index.size(), options());
   EXPECT_EQ(found.size(), 12u) << "six of either";
+}
+
+// In a field a wide sensor sees little, too: one that ever sees all round is not narrow.
+TEST_F(EitherView, ASessionIsNarrowWhereItNeverSeesMore) {
+  for (const int wide : {0, 20}) {
+    PlaceIndex index(options());
+    for (int i = 0; i < kPlaces; ++i) index.add(in_map(0, FrameId{i}), i, seen(place(0, i), kNarrowSectors));
+    for (int i = 0; i < kPlaces; ++i)
+      index.add(in_map(1, FrameId{i}), 100.0 + i, seen(place(1, i), i == wide ? kSectors : kNarrowSectors));
+    const auto found = *search_either_view(index, seen(place(1, 7), kNarrowSectors), index.size(), options());
+    EXPECT_EQ(found.size(), 12u) << "six of either; wide: " << wide;
+  }
 }
 
 }  // namespace

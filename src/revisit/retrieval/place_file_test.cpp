@@ -9,6 +9,9 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <thread>
@@ -152,8 +155,15 @@ TEST_F(PlaceFile, IsRefusedWhereverItWasAltered) {
 TEST_F(PlaceFile, IsRefusedWhenCutOff) {
   ASSERT_TRUE(filled(200).save(path));
   const std::string good = bytes(path);
-  for (const std::size_t size : {std::size_t{0}, std::size_t{7}, std::size_t{39}, std::size_t{4096}, good.size() - 1})
-    EXPECT_NE(error_of(written(good.substr(0, size))), "") << size;
+  for (const std::size_t size : {0u, 1u, 7u, 47u})
+    EXPECT_NE(error_of(written(good.substr(0, size))).find("is no place index of revisit (" + std::to_string(size)),
+              std::string::npos)
+        << size;
+  for (const std::size_t size : {std::size_t{48}, std::size_t{4096}, good.size() - 1})
+    EXPECT_NE(error_of(written(good.substr(0, size)))
+                  .find(std::to_string(size) + " bytes instead of the " + std::to_string(good.size()) + " that"),
+              std::string::npos)
+        << size;
   EXPECT_NE(error_of(written(good + '\0')), "") << "longer";
 }
 
@@ -168,11 +178,75 @@ TEST_F(PlaceFile, AnAlteredImageIsNoticedByTheSearchThatMeetsIt) {
   EXPECT_NE(found.error().message.find("other.places: places 0 to 4095"), std::string::npos) << found.error().message;
   EXPECT_FALSE(index->find(FrameId{0}));
   EXPECT_FALSE(index->save(path)) << "what is damaged is not saved as sound";
+  EXPECT_NE(index->save(path).error().message.find("do not have the checksum"), std::string::npos);
 
   altered = bytes(path);
   altered[altered.size() - 1] ^= 1;  // in the second chunk
   const std::string error = error_of(written(altered));
   EXPECT_NE(error.find("places 4096 to 8191 do not have"), std::string::npos) << error;
+}
+
+TEST_F(PlaceFile, AlteredIntensitiesAreNoticedWhereTheyAreUsed) {
+  ASSERT_TRUE(filled(4096).save(path));
+  std::string altered = bytes(path);
+  altered[altered.size() - 96 * (4096 - 300)] ^= 1;  // of the cells of place 300
+  const auto index = PlaceIndex::open(written(altered), options());
+  ASSERT_TRUE(index);
+  EXPECT_TRUE(index->find(FrameId{0}));
+  EXPECT_FALSE(index->find(FrameId{3 * 300}));
+  EXPECT_FALSE(index->search(small_context(300), index->size()));
+}
+
+TEST_F(PlaceFile, LeavesNothingMappedAndNothingUnset) {
+  ASSERT_TRUE(filled(5).save(path));
+  const auto is_mapped = [&] { return bytes("/proc/self/maps").find(path.string()) != std::string::npos; };
+  {
+    const auto index = PlaceIndex::open(path, options());
+    EXPECT_TRUE(is_mapped());
+  }
+  EXPECT_FALSE(is_mapped());
+  const std::string content = bytes(path);
+  EXPECT_EQ(content.substr(28, 4), std::string(4, '\0')) << "unused";
+  EXPECT_EQ(content.back(), '\0') << "room for more places";
+}
+
+// The rest is read in the background, once, and not before a first search had time.
+TEST_F(PlaceFile, InPiecesAllOfItIsReadAndThenLetGo) {
+  const PlaceIndex saved = filled(9000);
+  std::map<std::size_t, std::vector<std::byte>> pieces;
+  std::size_t size = 0;
+  ASSERT_TRUE(saved.save([&](std::size_t offset, std::span<const std::byte> of) {
+    pieces[offset] = {of.begin(), of.end()};
+    size = std::max(size, offset + of.size());
+    return ok();
+  }));
+  struct Reads {
+    std::mutex mutex;
+    std::map<std::size_t, int> times;
+    std::optional<std::chrono::steady_clock::time_point> first_behind;
+  };
+  const auto reads = std::make_shared<Reads>();
+  const auto opener = std::this_thread::get_id();
+  const auto began = std::chrono::steady_clock::now();
+  const auto opened = PlaceIndex::open(
+      "pieces", size,
+      [&pieces, opener, reads](std::size_t offset, std::span<std::byte> to) {
+        const std::lock_guard lock(reads->mutex);
+        ++reads->times[offset];
+        if (std::this_thread::get_id() != opener && !reads->first_behind)
+          reads->first_behind = std::chrono::steady_clock::now();
+        std::copy(pieces.at(offset).begin(), pieces.at(offset).end(), to.begin());
+        return ok();
+      },
+      options());
+  ASSERT_TRUE(opened) << opened.error().message;
+  while (reads.use_count() > 1 && std::chrono::steady_clock::now() - began < std::chrono::seconds(20))
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  ASSERT_EQ(reads.use_count(), 1) << "the reader is destroyed";
+  ASSERT_TRUE(reads->first_behind);
+  EXPECT_GE(*reads->first_behind - began, std::chrono::milliseconds(300));
+  EXPECT_EQ(reads->times.size(), pieces.size());
+  for (const auto& [offset, times] : reads->times) EXPECT_EQ(times, 1) << offset;
 }
 
 // Numbers of the header as they lie in the file (docs/formats.md).
@@ -210,8 +284,11 @@ TEST_F(PlaceFile, ErrorsSayWhatWasAllowed) {
   EXPECT_NE(error_of(written("a text file that is long enough to hold a header")).find("no place index"),
             std::string::npos);
   EXPECT_NE(error_of(folder).find("no regular file"), std::string::npos);
-  EXPECT_NE(error_of(folder / "absent").find("absent: "), std::string::npos);
-  EXPECT_FALSE(filled(5).save(folder / "no such folder" / "file"));
+  EXPECT_NE(error_of(folder / "absent").find("absent: No such file"), std::string::npos);
+  const Status failed = filled(5).save(folder / "no such folder" / "file");
+  ASSERT_FALSE(failed);
+  EXPECT_NE(failed.error().message.find("(" + std::to_string(fs::file_size(path)) + " bytes are needed)"),
+            std::string::npos);
 }
 
 }  // namespace

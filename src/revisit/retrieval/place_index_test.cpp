@@ -99,6 +99,8 @@ TEST(PlaceIndex, GatesAndShortlistAreKept) {
   options.separation_frames = 0;
   options.shortlist = 7;
   EXPECT_EQ(filled(options, 100).search(random_context(5), 100)->size(), 7u);
+  options.shortlist = 1;
+  EXPECT_EQ(filled(options, 100).search(random_context(5), 100)->size(), 1u);
   options.shortlist = 0;
   options.min_geometry_score = 0.999;
   EXPECT_EQ(filled(options, 100).search(random_context(5), 100)->size(), 1u) << "itself alone";
@@ -122,6 +124,11 @@ TEST(PlaceIndex, AScoreAtTheGateIsFoundWhateverItsRounding) {
     PlaceIndex index(options);
     index.add(FrameId{0}, 0.0, other);
     EXPECT_EQ(index.search(query, 1)->size(), 1u) << score;
+    options.min_intensity_score = match_descriptors(query, other).intensity_score;
+    PlaceIndex with_intensity(options);
+    with_intensity.add(FrameId{0}, 0.0, other);
+    EXPECT_EQ(with_intensity.search(query, 1)->size(), 1u) << score;
+    options.min_intensity_score = 0.0;
     options.min_geometry_score = score + 1e-9;
     PlaceIndex stricter(options);
     stricter.add(FrameId{0}, 0.0, other);
@@ -129,12 +136,34 @@ TEST(PlaceIndex, AScoreAtTheGateIsFoundWhateverItsRounding) {
   }
 }
 
+// What cannot reach the gate is not looked at.
+TEST(PlaceIndex, WithoutLayersTheGateSparesComparisons) {
+  DescriptorOptions flat;
+  flat.levels = 0;
+  RetrievalOptions options;
+  options.shortlist = 0;
+  SearchEffort effort[2];
+  for (const int strict : {0, 1}) {
+    options.min_geometry_score = strict == 1 ? 0.95 : 0.0;
+    PlaceIndex index(options);
+    for (int i = 0; i < 100; ++i)
+      index.add(FrameId{i}, 0.1 * i, describe(testing_support::random_points(600, static_cast<unsigned>(i)), flat));
+    ASSERT_TRUE(index.search(describe(testing_support::random_points(600, 5), flat), 100, 1, &effort[strict]));
+  }
+  EXPECT_EQ(effort[0].compared, 100u);
+  EXPECT_LT(effort[1].compared, 60u);
+}
+
 TEST(PlaceIndex, MisuseThrows) {
   PlaceIndex index = filled({}, 3);
   EXPECT_THROW(index.add(FrameId{2}, 1.0, random_context(1)), std::invalid_argument);
-  DescriptorOptions other;
-  other.rings = 5;
-  EXPECT_THROW(index.add(FrameId{9}, 1.0, describe({}, other)), std::invalid_argument);
+  DescriptorOptions fewer_rings, fewer_sectors, fewer_levels;
+  fewer_rings.rings = 5;
+  fewer_sectors.sectors /= 2;
+  fewer_levels.levels -= 1;
+  for (const int places : {1, 3})
+    for (const DescriptorOptions& other : {fewer_rings, fewer_sectors, fewer_levels})
+      EXPECT_THROW(filled({}, places).add(FrameId{9}, 1.0, describe({}, other)), std::invalid_argument);
   EXPECT_FALSE(index.find(FrameId{9}));
   index.add(FrameId{7}, 1.0, random_context(7));
   EXPECT_FALSE(index.find(FrameId{5})) << "between two that are there";
@@ -152,7 +181,10 @@ TEST(PlaceIndex, AnotherGridIsNotCompared) {
   fewer_sectors.sectors /= 2;
   fewer_levels.levels -= 1;
   for (const DescriptorOptions& each : {fewer_rings, fewer_sectors, fewer_levels})
-    EXPECT_THROW((void)index.search(describe(testing_support::random_points(600, 1), each), 3), std::invalid_argument);
+    for (const std::size_t places : {1u, 3u})
+      EXPECT_THROW((void)index.search(describe(testing_support::random_points(600, 1), each), places),
+                   std::invalid_argument);
+  EXPECT_TRUE(index.search(describe({}, fewer_rings), 0)->empty()) << "nothing is compared";
 }
 
 }  // namespace
