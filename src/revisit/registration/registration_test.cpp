@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <iterator>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -181,6 +182,28 @@ TEST(SurfaceCloud, ANarrowViewOfAStreetIsInTheOpen) {
   EXPECT_FALSE(SurfaceCloud(nothing).is_in_the_open());
 }
 
+// Seen no farther than so far, in a street with an open quarter or in a hall, up to so many degrees, to so many degrees
+// about the sensor.
+TEST(SurfaceCloud, AViewCutOffIsInTheOpenWhereItIsNotClosedIn) {
+  const auto sees = [](float reach_m, int open_deg, int highest_deg, int round_deg) {
+    std::vector<Point> points;
+    for (int azimuth = 0; azimuth < round_deg; ++azimuth)
+      for (int elevation = -15; elevation <= (azimuth < open_deg ? -3 : highest_deg); ++elevation) {
+        const double yaw_rad = to_radians(azimuth + 0.5), pitch_rad = to_radians(elevation);
+        points.push_back({static_cast<float>(reach_m * std::cos(pitch_rad) * std::cos(yaw_rad)),
+                          static_cast<float>(reach_m * std::cos(pitch_rad) * std::sin(yaw_rad)),
+                          static_cast<float>(reach_m * std::sin(pitch_rad)), 0.5f});
+      }
+    const SurfaceCloud cloud(thin(points, {}, 0.5));
+    return cloud.is_in_the_open();
+  };
+  EXPECT_TRUE(sees(24.f, 90, 5, 360));
+  EXPECT_FALSE(sees(24.f, 0, 5, 360)) << "a hall";
+  EXPECT_FALSE(sees(12.f, 90, 5, 360)) << "the walls of a hall may be farther away";
+  EXPECT_FALSE(sees(24.f, 90, 0, 360)) << "nothing looks up";
+  EXPECT_FALSE(sees(24.f, 90, 5, 200)) << "a narrow view fills few azimuths";
+}
+
 TEST(Agreement, AWallFixesNothingAlongItself) {
   std::vector<Point> wall, corner;
   for (float x = -8.f; x < 8.f; x += 0.2f)
@@ -218,7 +241,7 @@ TEST(SeenSpace, PutsPointsWhereExactAnglesDo) {
 }
 
 // Beams up to so many degrees, of which those above 3 degrees meet nothing in an open part of the circle.
-SeenSpace seen_below(int highest_deg, int open_deg) {
+std::vector<Point> points_below(int highest_deg, int open_deg) {
   std::vector<Point> points;
   for (int azimuth = 0; azimuth < 360; ++azimuth)
     for (int elevation = -15; elevation <= (azimuth < open_deg ? std::min(highest_deg, 3) : highest_deg); ++elevation) {
@@ -227,8 +250,9 @@ SeenSpace seen_below(int highest_deg, int open_deg) {
                         static_cast<float>(10.0 * std::cos(pitch_rad) * std::sin(yaw_rad)),
                         static_cast<float>(10.0 * std::sin(pitch_rad)), 0.5f});
     }
-  return SeenSpace(points);
+  return points;
 }
+SeenSpace seen_below(int highest_deg, int open_deg) { return SeenSpace(points_below(highest_deg, open_deg)); }
 
 TEST(SeenSpace, ARoofIsSeenAllRoundByWhatLooksUp) {
   EXPECT_TRUE(seen_below(15, 0).is_roofed());
@@ -237,6 +261,23 @@ TEST(SeenSpace, ARoofIsSeenAllRoundByWhatLooksUp) {
   EXPECT_FALSE(seen_below(15, 340).is_roofed()) << "a tower";
   EXPECT_FALSE(seen_below(2, 0).is_roofed()) << "nothing looks up";
   EXPECT_FALSE(SeenSpace().is_roofed());
+}
+
+TEST(SeenSpace, AStreetIsOpenWhereNothingIsWithinReach) {
+  const auto with_gap = [](int gap_deg, int lowest_deg) {
+    std::vector<Point> points = points_below(lowest_deg, 0);
+    const std::vector<Point> walls = points_below(5, 0);
+    std::copy_if(walls.begin(), walls.end(), std::back_inserter(points), [&](const Point& p) {
+      const double azimuth_deg = to_degrees(std::atan2(double{p.y}, double{p.x}));
+      return azimuth_deg < 0.0 || azimuth_deg > gap_deg;
+    });
+    return SeenSpace(points).is_open_to_the_sides();
+  };
+  EXPECT_FALSE(with_gap(0, -3));
+  EXPECT_FALSE(with_gap(42, -3)) << "a door, a window";
+  EXPECT_TRUE(with_gap(51, -3)) << "a street";
+  EXPECT_FALSE(with_gap(51, 5)) << "walls all round";
+  EXPECT_FALSE(SeenSpace().is_open_to_the_sides());
 }
 
 TEST(SeenSpace, KnowsWhatLiesBeforeAndBehind) {

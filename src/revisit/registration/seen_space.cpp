@@ -21,6 +21,11 @@ struct Roof {
   static constexpr int kFewest = kAzimuths * 95 / 100;       ///< azimuths seen up to the limit, or a cell less
 };
 
+// Of simulated rooms and halls 97 scans in a hundred and more are closed in 95 % of the azimuths, of streets cut off at
+// 25 m in 30 to 87 %.
+constexpr int kAboveHorizontal = 2;  // cells of elevation
+constexpr double kClosed = 0.875;    // share of azimuths
+
 constexpr auto kCellsARad = static_cast<float>(kAzimuths / (2.0 * kPi));
 
 // Angles in cells, counted from the left and from below.
@@ -117,6 +122,17 @@ bool SeenSpace::is_roofed() const {
   const int top = sorted[Roof::kLower];
   return top > Roof::kLeast &&
          std::count_if(highest.begin(), highest.end(), [&](int each) { return each >= top - 1; }) >= Roof::kFewest;
+}
+
+bool SeenSpace::is_open_to_the_sides() const {
+  int seen = 0, closed = 0;
+  for (auto column = cells_.begin(); column != cells_.end(); column += kElevations) {
+    const auto comes_back = [](const Interval& cell) { return cell.farthest_cm > 0; };
+    const auto above = column + kElevations / 2;
+    seen += std::any_of(column, column + kElevations, comes_back) ? 1 : 0;
+    closed += std::any_of(above, above + kAboveHorizontal, comes_back) ? 1 : 0;
+  }
+  return closed < kClosed * seen;
 }
 
 std::vector<std::uint16_t> SeenSpace::ranges_cm() const {

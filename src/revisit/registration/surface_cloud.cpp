@@ -42,6 +42,8 @@ struct Open {
   /// Of simulated rooms and warehouses (seeds 866 to 973) 95 scans in a hundred reach 46 m at most, one 51 m; a rosette
   /// in a street sees beyond in three of four scans and more.
   static constexpr float kFarthest_m = 50.f;
+  /// A sensor that sees no farther may have a hall's walls beyond its reach; one that does not look up, anything.
+  static constexpr float kLeastReach_m = 20.f, kLeastSlope = 0.02f;
 };
 
 struct Seeing {
@@ -66,7 +68,7 @@ SensorView view_of(const ThinCloud& cloud) {
     if (const float across_m = p.head<2>().norm(); across_m > 0.f) slopes.push_back(p.z() / across_m);
   }
   return {nth(ranges, Seeing::kShare), nth(slopes, Seeing::kOutermost), nth(slopes, 1.0 - Seeing::kOutermost),
-          cloud.seen.sector(), cloud.seen.is_roofed()};
+          cloud.seen.sector(),         cloud.seen.is_roofed(),          cloud.seen.is_open_to_the_sides()};
 }
 
 }  // namespace
@@ -104,7 +106,10 @@ SurfaceCloud::SurfaceCloud(ThinCloud cloud) : cloud_(std::move(cloud)) {
 }
 
 bool SurfaceCloud::is_in_the_open() const {
-  return (voxel_m() >= Open::kVoxel_m || view_.farthest_m >= Open::kFarthest_m) && !view_.is_roofed;
+  if (view_.is_roofed) return false;
+  return voxel_m() >= Open::kVoxel_m || view_.farthest_m >= Open::kFarthest_m ||
+         (view_.is_open_to_the_sides && view_.sector.is_all_round() && view_.farthest_m >= Open::kLeastReach_m &&
+          view_.greatest_slope >= Open::kLeastSlope);
 }
 
 SurfaceCloud::~SurfaceCloud() = default;

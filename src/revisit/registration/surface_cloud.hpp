@@ -47,7 +47,8 @@ struct SensorView {
   float farthest_m = 0.f;                         ///< of the points above ground
   float least_slope = 0.f, greatest_slope = 0.f;  ///< height over horizontal range, in the LiDAR's frame
   SeenSpace::Sector sector;
-  bool is_roofed = false;  ///< SeenSpace::is_roofed()
+  bool is_roofed = false;             ///< SeenSpace::is_roofed()
+  bool is_open_to_the_sides = false;  ///< SeenSpace::is_open_to_the_sides()
 
   bool holds(const Eigen::Vector3f& p) const {
     const float across_m = p.head<2>().norm();
@@ -75,8 +76,8 @@ class SurfaceCloud final : public Surface {
   const Eigen::Vector3f& up() const { return cloud_.up; }
   /// Edge of the voxels that the cloud was thinned with.
   double voxel_m() const { return static_cast<double>(cloud_.voxel_m); }
-  /// No room, as far as one scan shows: it fills many voxels, or sees farther than rooms reach, and has no roof. A
-  /// narrow sensor fills few voxels anywhere.
+  /// No room, as far as one scan shows: it fills many voxels, or sees farther than rooms reach, or sees all round and
+  /// is not closed in; and has no roof. A narrow sensor fills few voxels anywhere.
   bool is_in_the_open() const;
   float intensity(std::size_t i) const { return cloud_.intensity[i]; }
   const SeenSpace& seen() const { return cloud_.seen; }
