@@ -101,8 +101,8 @@ TEST_F(EitherView, ElseTheSearchIsOneOfAllPlaces) {
 }
 
 TEST_F(EitherView, ASessionBeginsWithItsFirstPlace) {
-  for (const int session : {1, 2}) {
-    const IntensityScanContext query = seen(place(session, 0), kNarrowSectors, session == 1 ? 0.3 : 0.5);
+  for (const int session : {0, 1, 2}) {
+    const IntensityScanContext query = seen(place(session, 0), kNarrowSectors, session < 2 ? 0.3 : 0.5);
     const auto found = *search_either_view(index_, query, index_.size(), options());
     ASSERT_FALSE(of_session(found, session).empty());
     EXPECT_EQ(of_session(found, session).front(), in_map(session, FrameId{0}));
