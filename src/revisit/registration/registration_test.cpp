@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <iterator>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -182,20 +181,27 @@ TEST(SurfaceCloud, ANarrowViewOfAStreetIsInTheOpen) {
   EXPECT_FALSE(SurfaceCloud(nothing).is_in_the_open());
 }
 
-// Seen no farther than so far, in a street with an open quarter or in a hall, up to so many degrees, to so many degrees
-// about the sensor.
+// What beams from 15 degrees below to so many above, by their azimuth, meet at one range.
+template <typename HighestDeg>
+std::vector<Point> met_at(float range_m, HighestDeg highest_deg) {
+  std::vector<Point> points;
+  for (int azimuth = 0; azimuth < 360; ++azimuth)
+    for (int elevation = -15; elevation <= highest_deg(azimuth); ++elevation) {
+      const double yaw_rad = to_radians(azimuth + 0.5), pitch_rad = to_radians(elevation);
+      points.push_back({static_cast<float>(range_m * std::cos(pitch_rad) * std::cos(yaw_rad)),
+                        static_cast<float>(range_m * std::cos(pitch_rad) * std::sin(yaw_rad)),
+                        static_cast<float>(range_m * std::sin(pitch_rad)), 0.5f});
+    }
+  return points;
+}
+
 TEST(SurfaceCloud, AViewCutOffIsInTheOpenWhereItIsNotClosedIn) {
-  const auto sees = [](float reach_m, int open_deg, int highest_deg, int round_deg) {
-    std::vector<Point> points;
-    for (int azimuth = 0; azimuth < round_deg; ++azimuth)
-      for (int elevation = -15; elevation <= (azimuth < open_deg ? -3 : highest_deg); ++elevation) {
-        const double yaw_rad = to_radians(azimuth + 0.5), pitch_rad = to_radians(elevation);
-        points.push_back({static_cast<float>(reach_m * std::cos(pitch_rad) * std::cos(yaw_rad)),
-                          static_cast<float>(reach_m * std::cos(pitch_rad) * std::sin(yaw_rad)),
-                          static_cast<float>(reach_m * std::sin(pitch_rad)), 0.5f});
-      }
-    const SurfaceCloud cloud(thin(points, {}, 0.5));
-    return cloud.is_in_the_open();
+  // The first azimuths are open, those from `end_deg` on are not seen.
+  const auto sees = [](float range_m, int open_deg, int highest_deg, int end_deg) {
+    const auto highest_at = [=](int azimuth) {
+      return azimuth >= end_deg ? -16 : azimuth < open_deg ? -3 : highest_deg;
+    };
+    return SurfaceCloud(thin(met_at(range_m, highest_at), {}, 0.5)).is_in_the_open();
   };
   EXPECT_TRUE(sees(24.f, 90, 5, 360));
   EXPECT_FALSE(sees(24.f, 0, 5, 360)) << "a hall";
@@ -241,18 +247,10 @@ TEST(SeenSpace, PutsPointsWhereExactAnglesDo) {
 }
 
 // Beams up to so many degrees, of which those above 3 degrees meet nothing in an open part of the circle.
-std::vector<Point> points_below(int highest_deg, int open_deg) {
-  std::vector<Point> points;
-  for (int azimuth = 0; azimuth < 360; ++azimuth)
-    for (int elevation = -15; elevation <= (azimuth < open_deg ? std::min(highest_deg, 3) : highest_deg); ++elevation) {
-      const double yaw_rad = to_radians(azimuth + 0.5), pitch_rad = to_radians(elevation);
-      points.push_back({static_cast<float>(10.0 * std::cos(pitch_rad) * std::cos(yaw_rad)),
-                        static_cast<float>(10.0 * std::cos(pitch_rad) * std::sin(yaw_rad)),
-                        static_cast<float>(10.0 * std::sin(pitch_rad)), 0.5f});
-    }
-  return points;
+SeenSpace seen_below(int highest_deg, int open_deg) {
+  return SeenSpace(
+      met_at(10.f, [=](int azimuth) { return azimuth < open_deg ? std::min(highest_deg, 3) : highest_deg; }));
 }
-SeenSpace seen_below(int highest_deg, int open_deg) { return SeenSpace(points_below(highest_deg, open_deg)); }
 
 TEST(SeenSpace, ARoofIsSeenAllRoundByWhatLooksUp) {
   EXPECT_TRUE(seen_below(15, 0).is_roofed());
@@ -264,14 +262,10 @@ TEST(SeenSpace, ARoofIsSeenAllRoundByWhatLooksUp) {
 }
 
 TEST(SeenSpace, AStreetIsOpenWhereNothingIsWithinReach) {
-  const auto with_gap = [](int gap_deg, int lowest_deg) {
-    std::vector<Point> points = points_below(lowest_deg, 0);
-    const std::vector<Point> walls = points_below(5, 0);
-    std::copy_if(walls.begin(), walls.end(), std::back_inserter(points), [&](const Point& p) {
-      const double azimuth_deg = to_degrees(std::atan2(double{p.y}, double{p.x}));
-      return azimuth_deg < 0.0 || azimuth_deg > gap_deg;
-    });
-    return SeenSpace(points).is_open_to_the_sides();
+  // Walls, and a gap in which beams come back up to so many degrees.
+  const auto with_gap = [](int gap_deg, int highest_deg) {
+    return SeenSpace(met_at(10.f, [=](int azimuth) { return azimuth < gap_deg ? highest_deg : 5; }))
+        .is_open_to_the_sides();
   };
   EXPECT_FALSE(with_gap(0, -3));
   EXPECT_FALSE(with_gap(42, -3)) << "a door, a window";

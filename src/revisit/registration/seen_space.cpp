@@ -21,8 +21,8 @@ struct Roof {
   static constexpr int kFewest = kAzimuths * 95 / 100;       ///< azimuths seen up to the limit, or a cell less
 };
 
-// Of simulated rooms and halls 97 scans in a hundred and more are closed in 95 % of the azimuths, of streets cut off at
-// 25 m in 30 to 87 %.
+// Simulated rooms and halls (seeds 1821 and 1822, sensors that see all round) are closed in all azimuths in 98 scans of
+// a hundred, streets of which nothing is seen beyond 25 m in 30 to 85 % of them.
 constexpr int kAboveHorizontal = 2;  // cells of elevation
 constexpr double kClosed = 0.875;    // share of azimuths
 

@@ -44,8 +44,8 @@ class SeenSpace {
   /// Something was seen overhead all round: in nearly every azimuth the beams that look up farthest, 9 degrees and
   /// more, came back. False for a sensor that does not look up so far.
   bool is_roofed() const;
-  /// In more than one of eight azimuths that were seen, nothing came back from the horizontal to 6 degrees above it:
-  /// what stands there, if anything, is beyond the sensor's reach. In rooms walls come back.
+  /// In more than one of eight azimuths that were seen, nothing came back from 0 to 6 degrees above the LiDAR's xy
+  /// plane: what stands there, if anything, is beyond its reach. In rooms walls come back.
   bool is_open_to_the_sides() const;
 
   void archive(auto& fields) {

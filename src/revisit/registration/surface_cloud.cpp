@@ -42,7 +42,8 @@ struct Open {
   /// Of simulated rooms and warehouses (seeds 866 to 973) 95 scans in a hundred reach 46 m at most, one 51 m; a rosette
   /// in a street sees beyond in three of four scans and more.
   static constexpr float kFarthest_m = 50.f;
-  /// A sensor that sees no farther may have a hall's walls beyond its reach; one that does not look up, anything.
+  /// Below this reach, the walls of a hall may be too far to be seen; below this slope, no beam looks above the
+  /// horizontal. Then it says nothing that few come back from there.
   static constexpr float kLeastReach_m = 20.f, kLeastSlope = 0.02f;
 };
 

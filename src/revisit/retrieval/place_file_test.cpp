@@ -15,6 +15,7 @@
 #include <span>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -42,6 +43,18 @@ class PlaceFile : public testing::Test {
     PlaceIndex index{options()};
     for (int i = 0; i < places; ++i) index.add(FrameId{3 * i}, 0.1 * i, small_context(static_cast<unsigned>(i % 700)));
     return index;
+  }
+  // By their offset, and the size of all.
+  using Pieces = std::map<std::size_t, std::vector<std::byte>>;
+  static std::pair<Pieces, std::size_t> pieces_of(const PlaceIndex& index) {
+    Pieces pieces;
+    std::size_t size = 0;
+    EXPECT_TRUE(index.save([&](std::size_t offset, std::span<const std::byte> bytes) {
+      pieces[offset] = {bytes.begin(), bytes.end()};
+      size = std::max(size, offset + bytes.size());
+      return ok();
+    }));
+    return {std::move(pieces), size};
   }
   static RetrievalOptions options() {
     RetrievalOptions result;
@@ -100,14 +113,8 @@ TEST_F(PlaceFile, AnswersAsTheIndexThatWasSavedAndGrowsOn) {
 // The pieces lie anywhere, as in the rows of a map.
 TEST_F(PlaceFile, InPiecesItAnswersTheSameAndNoticesWhatWasAltered) {
   const PlaceIndex saved = filled(5000);
-  std::map<std::size_t, std::vector<std::byte>> pieces;
-  std::size_t size = 0;
-  ASSERT_TRUE(saved.save([&](std::size_t offset, std::span<const std::byte> bytes) {
-    pieces[offset] = {bytes.begin(), bytes.end()};
-    size = std::max(size, offset + bytes.size());
-    return ok();
-  }));
-  const auto read = [&](std::size_t offset, std::span<std::byte> to) -> Status {
+  auto [pieces, size] = pieces_of(saved);
+  const auto read = [&pieces = pieces](std::size_t offset, std::span<std::byte> to) -> Status {
     const auto found = pieces.find(offset);
     if (found == pieces.end() || found->second.size() != to.size()) return Error{"no such piece"};
     std::copy(found->second.begin(), found->second.end(), to.begin());
@@ -213,13 +220,7 @@ TEST_F(PlaceFile, LeavesNothingMappedAndNothingUnset) {
 // The rest is read in the background, once, and not before a first search had time.
 TEST_F(PlaceFile, InPiecesAllOfItIsReadAndThenLetGo) {
   const PlaceIndex saved = filled(9000);
-  std::map<std::size_t, std::vector<std::byte>> pieces;
-  std::size_t size = 0;
-  ASSERT_TRUE(saved.save([&](std::size_t offset, std::span<const std::byte> of) {
-    pieces[offset] = {of.begin(), of.end()};
-    size = std::max(size, offset + of.size());
-    return ok();
-  }));
+  const auto [pieces, size] = pieces_of(saved);
   struct Reads {
     std::mutex mutex;
     std::map<std::size_t, int> times;
@@ -230,7 +231,7 @@ TEST_F(PlaceFile, InPiecesAllOfItIsReadAndThenLetGo) {
   const auto began = std::chrono::steady_clock::now();
   const auto opened = PlaceIndex::open(
       "pieces", size,
-      [&pieces, opener, reads](std::size_t offset, std::span<std::byte> to) {
+      [&pieces = pieces, opener, reads](std::size_t offset, std::span<std::byte> to) {
         const std::lock_guard lock(reads->mutex);
         ++reads->times[offset];
         if (std::this_thread::get_id() != opener && !reads->first_behind)
