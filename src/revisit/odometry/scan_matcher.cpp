@@ -7,6 +7,7 @@
 
 #include <oneapi/tbb/task_arena.h>
 #include <oneapi/tbb/task_group.h>
+#include <Eigen/LU>
 
 #include <revisit/odometry/motion_limits.hpp>
 #include <revisit/odometry/starts_in_a_gap.hpp>
@@ -48,8 +49,9 @@ struct Matching {
   // Share of what the last tracked scan had on upright surfaces: the ground fits wherever the sensor went. Right steps
   // have .35 and more of it, the first wrong ones of cars whose turn ended between two scans .06 to .08.
   static constexpr double kLeastOfLastSideways = 0.3;
-  static constexpr double kMostSlip = 0.6, kSlip_m = 0.1;  ///< of what wheels measure, and so much more
-  static constexpr double kNarrowSearch_m = 0.3;           ///< where a wide search found what cannot be
+  static constexpr double kMostSlip = 0.6, kSlip_m = 0.1;   ///< of what wheels measure, and so much more
+  static constexpr double kWheels_m = 0.02, kWheels = 0.1;  ///< standard deviation of what they measure
+  static constexpr double kNarrowSearch_m = 0.3;            ///< where a wide search found what cannot be
   // The first scans of a sparse sensor meet few surfaces; those that they meet must fit.
   static constexpr int kFirstScans = 5;
   static constexpr double kStart_m = 1.0;  ///< tried on every side
@@ -163,26 +165,45 @@ ScanMatch ScanMatcher::match(double stamp_s, const MatcherScan& scan, const std:
                                             : Pose::Identity();
   std::optional<double> measured_m;
   if (T_previous_lidar && !is_guess) measured_m = T_previous_lidar->translation().norm();
-  return match_within(map_ ? search_radius_m() : 0.0, stamp_s, scan, T_predicted, measured_m, search);
+  return match_within(map_ ? search_radius_m() : 0.0, stamp_s, scan, T_predicted, T_predicted, measured_m, search);
 }
 
 ScanMatch ScanMatcher::match_again(double stamp_s, const MatcherScan& scan, const ScanMatch& match,
                                    Search search) const {
-  return match_within(map_ ? fine_m() : 0.0, stamp_s, scan, match.T_previous_found, match.measured_m, search);
+  return match_within(map_ ? fine_m() : 0.0, stamp_s, scan, match.T_previous_predicted, match.T_previous_found,
+                      match.measured_m, search);
+}
+
+// Where few surfaces fix the position, how the sensor moved so far tells more of it.
+std::optional<PositionPrior> ScanMatcher::prior_at(double stamp_s, const MatcherScan& scan, const Pose& T_predicted,
+                                                   std::optional<double> measured_m) const {
+  const double gap_s = stamp_s - last_stamp_s_;
+  const Pose T_odom_predicted = T_odom_lidar_ * T_predicted;
+  const Eigen::Vector3d position_m = T_odom_predicted.translation();
+  if (measured_m) {
+    const double off_m = Matching::kWheels_m + Matching::kWheels * *measured_m;
+    return PositionPrior{position_m, Eigen::Matrix3d::Identity() / (off_m * off_m)};
+  }
+  if (!motion_ || scan.is_stamp_assumed || gap_s <= 0.0 || gap_s > Matching::kSparse_s) return std::nullopt;
+  const Eigen::Matrix3d R = T_odom_predicted.linear();
+  const Eigen::Matrix3d covariance_m2 = velocity_.covariance_after(gap_s, T_predicted.linear());
+  return PositionPrior{position_m, R * covariance_m2.inverse() * R.transpose()};
 }
 
 ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const MatcherScan& scan, const Pose& T_predicted,
-                                    std::optional<double> measured_m, Search search) const {
+                                    const Pose& T_start, std::optional<double> measured_m, Search search) const {
   ScanMatch match;
   match.measured_m = measured_m;
-  match.T_previous_lidar = match.T_previous_found = T_predicted;
-  match.T_odom_lidar = normalised(T_odom_lidar_ * T_predicted);
+  match.T_previous_predicted = T_predicted;
+  match.T_previous_lidar = match.T_previous_found = T_start;
+  match.T_odom_lidar = normalised(T_odom_lidar_ * T_start);
   if (!map_) {
     match.is_tracked = true;  // the map begins wherever it is
     return match;
   }
   wait();
-  const auto align_points = [&](std::span<const Eigen::Vector3f> points, double width_m, const Pose& T_from) {
+  const auto align_points = [&](std::span<const Eigen::Vector3f> points, double width_m, const Pose& T_from,
+                                const std::optional<PositionPrior>& prior = {}) {
     IcpResult icp = align_icp(*map_, points, T_odom_lidar_ * T_from,
                               {.coarse_m = width_m,
                                .fine_m = std::min(width_m, fine_m()),
@@ -190,7 +211,8 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
                                .settled_m = Matching::kSettled_m,
                                .least_seen = Matching::kLeastSeen,
                                .level_deg = level_deg(rings_),
-                               .noise_m = rings_ > 0 ? Matching::kNoise_m : 0.0});
+                               .noise_m = rings_ > 0 ? Matching::kNoise_m : 0.0,
+                               .prior = prior});
     icp.converged = icp.converged || (icp.information(0, 0) > 0.0 && icp.last_step_m < Matching::kSteady_m);
     return icp;
   };
@@ -199,7 +221,8 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
   const bool follows = gap_s > 0.0 && gap_s <= Matching::kLongestGap_s;
   // Since the last scan that was tracked: the longer ago, the farther may the sensor be from where it was predicted.
   const double untracked_s = (stamp_s - tracked_stamp_s_) * (scan.is_stamp_assumed ? Matching::kLongestAssumed : 1.0);
-  const MotionLimits limits(T_odom_lidar_ * T_predicted, untracked_s);
+  const MotionLimits limits(T_odom_lidar_ * T_start, untracked_s);
+  const auto prior = prior_at(stamp_s, scan, T_predicted, measured_m);
   const auto is_possible = [&](const IcpResult& icp) {
     // Wheels slip, but not like this: it is the surroundings that move along with the sensor.
     const double found_m = (T_odom_tracked_.inverse() * icp.T_target_source).translation().norm();
@@ -220,14 +243,19 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
   const auto fits = [&](const IcpResult& icp) {
     return icp.converged && is_possible(icp) && is_credible(icp, is_predicted);
   };
-  IcpResult icp = align(radius_m, T_predicted);
-  if (!is_possible(icp)) icp = align(std::min(radius_m, Matching::kNarrowSearch_m), T_predicted);
+  IcpResult icp = align_points(scan.points, radius_m, T_start, prior);
+  if (!is_possible(icp)) icp = align_points(scan.points, std::min(radius_m, Matching::kNarrowSearch_m), T_start, prior);
+  // Unless a jolt or a turn back shows: what stands upright fits far better where the motion so far does not lead.
+  if (prior && icp.matched_sideways < Matching::kDoubtful * last_sideways_) {
+    const IcpResult free = align(radius_m, T_start);
+    if (free.matched_sideways * Matching::kDoubtful > icp.matched_sideways && is_possible(free)) icp = free;
+  }
   // The second scan of a drive that began in motion: what was seen once fits, to some degree, where the sensor stands.
   if (scans_ == 1 && !measured_m)
     for (const double angle_deg : {0.0, 90.0, 180.0, 270.0}) {
       const double angle_rad = to_radians(angle_deg);
-      const IcpResult other = align(radius_m, T_predicted * planar_pose(Matching::kStart_m * std::cos(angle_rad),
-                                                                        Matching::kStart_m * std::sin(angle_rad), 0.0));
+      const IcpResult other = align(radius_m, T_start * planar_pose(Matching::kStart_m * std::cos(angle_rad),
+                                                                    Matching::kStart_m * std::sin(angle_rad), 0.0));
       if (other.matched_sideways > icp.matched_sideways && is_possible(other)) icp = other;
     }
   std::vector<Eigen::Vector3f> few;
@@ -243,15 +271,15 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
     IcpResult best = icp;
     double most = is_possible(icp) ? Matching::kBetter * align_few(fine_m(), seen_from(icp)).matched_sideways : 0.0;
     const auto compare_from = [&](const std::vector<Pose>& starts) {
-      for (const Pose& T_start : starts) {
-        const IcpResult tried = align_few(Matching::kFarSearch_m, T_start);
+      for (const Pose& T_from : starts) {
+        const IcpResult tried = align_few(Matching::kFarSearch_m, T_from);
         if (tried.matched_sideways <= most || !is_possible(tried)) continue;
         most = Matching::kBetter * tried.matched_sideways;
         best = align(fine_m(), seen_from(tried));
       }
     };
     const StartsInAGap starts =
-        scans_ == 1 ? StartsInAGap::of_second_scan(gap_s) : StartsInAGap::after(gap_s, T_predicted, motion_);
+        scans_ == 1 ? StartsInAGap::of_second_scan(gap_s) : StartsInAGap::after(gap_s, T_start, motion_);
     compare_from(starts.likely);
     if (best.matched_sideways < Matching::kDoubtful * last_sideways_) compare_from(starts.unlikely);
     if (is_possible(best) && (best.matched_sideways > icp.matched_sideways || !is_possible(icp))) icp = best;
@@ -270,7 +298,7 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
   const Pose T_tracked = T_odom_lidar_.inverse() * T_odom_tracked_;
   for (const double turn_deg : Matching::kTurnsTried_deg) {
     if (turn_deg != 0.0 && !follows) break;
-    try_from(T_predicted, turn_deg);
+    try_from(T_start, turn_deg);
     try_from(Pose::Identity(), turn_deg);
   }
   const IcpResult near = icp;
@@ -291,12 +319,13 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
   match.met = icp.met;
   match.is_tracked = is_tracked;
   match.T_previous_found = T_odom_lidar_.inverse() * icp.T_target_source;
-  const Pose error = T_predicted.inverse() * match.T_previous_found;
+  const Pose error = T_start.inverse() * match.T_previous_found;
   match.prediction_error_m = error.translation().norm() + rotation_angle(error) * range_m_;
   if (match.is_tracked) {
     match.T_odom_lidar = normalised(icp.T_target_source);
     match.T_previous_lidar = match.T_previous_found;
     match.information = icp.information;
+    match.position_information = icp.position_information;
   }
   return match;
 }
@@ -313,10 +342,15 @@ void ScanMatcher::accept(double stamp_s, const MatcherScan& scan, const ScanMatc
           share * (match.prediction_error_m * match.prediction_error_m - squared_prediction_error_m2_);
       typical_match_ += share * (match.matched - typical_match_);
     }
-    motion_.reset();
-    if (gap_s > 0.0 && gap_s <= Matching::kLongestGap_s)
+    if (gap_s > 0.0 && gap_s <= Matching::kLongestGap_s) {
+      velocity_.advance(gap_s, match.T_previous_lidar, match.position_information);
       motion_ =
           match.is_tracked ? motion_found(match.T_previous_lidar, stamp_s) : twist_of(match.T_previous_lidar, gap_s);
+      motion_->linear_mps = velocity_.velocity_mps();
+    } else {
+      motion_.reset();
+      velocity_ = {};
+    }
   }
   T_odom_lidar_ = match.T_odom_lidar;
   const Eigen::Vector3f here = T_odom_lidar_.translation().cast<float>();
@@ -351,6 +385,7 @@ void ScanMatcher::restart() {
   wait();
   map_.reset();
   motion_.reset();
+  velocity_ = {};
   squared_prediction_error_m2_ = typical_match_ = last_sideways_ = 0.0;
   scans_ = 0;
 }

@@ -12,6 +12,7 @@
 #include <revisit/core/twist.hpp>
 #include <revisit/odometry/last_view.hpp>
 #include <revisit/odometry/local_map.hpp>
+#include <revisit/odometry/velocity_filter.hpp>
 #include <revisit/registration/icp.hpp>
 
 namespace revisit {
@@ -26,16 +27,18 @@ struct MatcherScan {
 
 /// Where one scan was matched.
 struct ScanMatch {
-  Pose T_odom_lidar = Pose::Identity();      ///< at the scan's stamp; the first scan is the origin
-  Pose T_previous_lidar = Pose::Identity();  ///< motion since the scan before
-  Pose T_previous_found = Pose::Identity();  ///< the same as registration has it, believed or not
-  Matrix6 information = Matrix6::Zero();     ///< of T_previous_lidar, as in LoopConstraint
-  double matched = 0.0;                      ///< share of the scan's points that lie on a surface of the map
-  double matched_sideways = 0.0;             ///< the same of what stands upright alone (IcpResult)
-  double met = 0.0;                          ///< share with a surface of the map nearby at all
-  double prediction_error_m = 0.0;           ///< of a point at the median range
-  std::optional<double> measured_m;          ///< what wheels say the sensor moved
-  bool is_tracked = false;                   ///< otherwise the pose is the predicted one
+  Pose T_odom_lidar = Pose::Identity();          ///< at the scan's stamp; the first scan is the origin
+  Pose T_previous_lidar = Pose::Identity();      ///< motion since the scan before
+  Pose T_previous_found = Pose::Identity();      ///< the same as registration has it, believed or not
+  Pose T_previous_predicted = Pose::Identity();  ///< and as it was expected
+  Matrix6 information = Matrix6::Zero();         ///< of T_previous_lidar, as in LoopConstraint
+  Eigen::Matrix3d position_information = Eigen::Matrix3d::Zero();  ///< as in IcpResult
+  double matched = 0.0;                                            ///< share of the points on a surface of the map
+  double matched_sideways = 0.0;     ///< the same of what stands upright alone (IcpResult)
+  double met = 0.0;                  ///< share with a surface of the map nearby at all
+  double prediction_error_m = 0.0;   ///< of a point at the median range
+  std::optional<double> measured_m;  ///< what wheels say the sensor moved
+  bool is_tracked = false;           ///< otherwise the pose is the predicted one
 };
 
 /// Finds scans in the map of what was seen lately: the registration inside `Odometry`. Nothing to tune: the map's
@@ -83,7 +86,7 @@ class ScanMatcher {
     if (!has_map) map_.reset();
     if (has_map && !map_) map_ = std::make_unique<LocalMap>(1.0, 1.0);  // of whatever size the archive says
     if (has_map) fields(*map_);
-    fields(T_odom_lidar_, motion_, forgotten_from_, last_stamp_s_, range_m_, untracked_m_, T_odom_tracked_,
+    fields(T_odom_lidar_, motion_, velocity_, forgotten_from_, last_stamp_s_, range_m_, untracked_m_, T_odom_tracked_,
            tracked_stamp_s_, squared_prediction_error_m2_, typical_match_, last_sideways_, scans_, rings_, last_view_);
   }
 
@@ -93,7 +96,9 @@ class ScanMatcher {
   class Insertion;
   void wait() const;
   ScanMatch match_within(double radius_m, double stamp_s, const MatcherScan& scan, const Pose& T_predicted,
-                         std::optional<double> measured_m, Search search) const;
+                         const Pose& T_start, std::optional<double> measured_m, Search search) const;
+  std::optional<PositionPrior> prior_at(double stamp_s, const MatcherScan& scan, const Pose& T_predicted,
+                                        std::optional<double> measured_m) const;
   double fine_m() const;
   double search_radius_m() const;
   bool is_credible(const IcpResult& icp, bool is_predicted) const;
@@ -102,6 +107,7 @@ class ScanMatcher {
   std::unique_ptr<Insertion> insertion_;  ///< of the last scan into the map; waited for before the map is read
   Pose T_odom_lidar_ = Pose::Identity();
   std::optional<Twist> motion_;
+  VelocityFilter velocity_;
   Eigen::Vector3f forgotten_from_ = Eigen::Vector3f::Zero();  ///< where the map was last cut to its reach
   double last_stamp_s_ = 0.0, range_m_ = 0.0;
   double untracked_m_ = 0.0;                  ///< moved since the last scan that was tracked

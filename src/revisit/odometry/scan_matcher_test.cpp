@@ -141,6 +141,25 @@ TEST(ScanMatcher, TheGroundAloneIsNoMatch) {
   EXPECT_FALSE(step.is_tracked);
 }
 
+// Onto a meadow: of what stands upright ever less is seen, and grass is where it is by chance. Wheels tell the way.
+TEST(ScanMatcher, GoesAsWheelsTellOverAMeadow) {
+  ScanMatcher matcher;
+  std::mt19937 random(9);
+  std::normal_distribution<float> grass(0.f, 0.08f);
+  double squares = 0.0;
+  for (int i = 0; i < 50; ++i) {
+    std::vector<Point> points = seen_from(31, SyntheticWorld::at(0.12 * i, 0.0, 0.0), static_cast<unsigned>(i));
+    const int every = 1 << i / 2;
+    int upright = 0;
+    std::erase_if(points, [&](const Point& p) { return p.z > -1.5f && ++upright % every != 0; });
+    for (Point& p : points) p.z += p.z < -1.5f ? grass(random) : 0.f;
+    const ScanMatch step = track(matcher, 0.1 * i, points, planar_pose(0.12, 0.0, 0.0));
+    if (i > 20)
+      squares += (step.T_previous_lidar.translation() - Eigen::Vector3d(0.12, 0.0, 0.0)).head<2>().squaredNorm();
+  }
+  EXPECT_LT(std::sqrt(squares / 29), 0.03) << "of 0.12 m";
+}
+
 // Twice a second at 12 m/s, from the first scan on, then a turn that the motion before does not tell.
 TEST(ScanMatcher, FollowsACarTwiceASecond) {
   ScanMatcher matcher;

@@ -28,6 +28,7 @@ struct Steps {
   static constexpr int kMostTilts = 10;        ///< steps of height and tilt alone
   // Points share the errors of the surfaces that they lie on, so that they count for fewer than they are.
   static constexpr double kPointsThatCountAsOne = 10.0, kLeastNoise_m = 0.02;
+  static constexpr double kSurface_m = 0.01;  ///< standard deviation where all surfaces face one direction
 };
 
 // The normal equations of a Gauss-Newton step (metres, then radians about the source's origin, both along the target's
@@ -148,6 +149,8 @@ Equations equations_of(const Surface& target, Points source, const IcpOptions& o
   return sum;
 }
 
+double variance_of_surfaces_m2(const Equations& sum) { return sum.certain * Steps::kSurface_m * Steps::kSurface_m; }
+
 // What the equations at T say about its error, seen from the source.
 Matrix6 information_of(const Equations& sum, const Pose& T) {
   const double variance_m2 =
@@ -155,6 +158,20 @@ Matrix6 information_of(const Equations& sum, const Pose& T) {
   Matrix6 axes = Matrix6::Zero();
   axes.topLeftCorner<3, 3>() = axes.bottomRightCorner<3, 3>() = T.linear();
   return axes.transpose() * sum.H * axes / (Steps::kPointsThatCountAsOne * variance_m2);
+}
+
+// The same of the position alone.
+Eigen::Matrix3d position_information_of(const Equations& sum, const Pose& T) {
+  const Eigen::Matrix3d turns = sum.H.bottomRightCorner<3, 3>(), both = sum.H.topRightCorner<3, 3>();
+  const Eigen::Matrix3d alone = sum.H.topLeftCorner<3, 3>() - both * turns.ldlt().solve(both.transpose());
+  if (!alone.allFinite()) return Eigen::Matrix3d::Zero();
+  return T.linear().transpose() * alone * T.linear() / variance_of_surfaces_m2(sum);
+}
+
+void add_prior(const PositionPrior& prior, const Pose& T, Equations& sum) {
+  const Eigen::Matrix3d H = variance_of_surfaces_m2(sum) * prior.information;
+  sum.H.topLeftCorner<3, 3>() += H;
+  sum.g.head<3>() += H * (T.translation() - prior.position_m);
 }
 
 // The step without its part along directions that next to nothing fixes (Zhang et al., "On degeneracy of
@@ -211,6 +228,8 @@ bool step(const Surface& target, Points source, const IcpOptions& options, doubl
   }
   if (sum.pairs < Steps::kFewestPairs) return false;
   result.information = information_of(sum, T);
+  result.position_information = position_information_of(sum, T);
+  if (options.prior && noise_m <= 0.0) add_prior(*options.prior, T, sum);
   sum.H.diagonal().array() += 1e-6 * sum.H.diagonal().maxCoeff();  // a direction that nothing sees stays where it was
   Vector6 xi = solution(sum, T, noise_m);
   if (options.least_seen > 0.0) xi = seen_part(xi, sum, options.least_seen);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <span>
 
 #include <revisit/core/pose.hpp>
@@ -23,6 +24,15 @@ struct IcpResult {
   /// Inverse covariance of xi where the true pose is T_target_source * small_motion(xi): metres, then radians, in the
   /// source's frame. Small along what the scans do not fix. Zero where too few points met.
   Matrix6 information = Matrix6::Zero();
+  /// Of the position alone, whatever the rotation, where all points share the errors of their surfaces: what counts is
+  /// where these face, not how many points lie on them. In the source's frame. To be weighed against a prior.
+  Eigen::Matrix3d position_information = Eigen::Matrix3d::Zero();
+};
+
+/// Where a source is thought to be before it is compared.
+struct PositionPrior {
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();   ///< of its origin, in the target's frame
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< inverse covariance along the target's axes
 };
 
 struct IcpOptions {
@@ -41,6 +51,8 @@ struct IcpOptions {
   /// pair weighed by the noise of points (this, a standard deviation) and the variance of its patch. Only they: along
   /// the ground a lorry beside is as certain as any wall.
   double noise_m = 0.0;
+  /// Weighed against what the surfaces say of the position (IcpResult::position_information).
+  std::optional<PositionPrior> prior = {};
   /// Normals of the source, one a point: plane-to-plane (generalised ICP, Segal et al., RSS 2009, with the covariances
   /// of planes); empty: point-to-plane.
   std::span<const Eigen::Vector3f> source_normals = {};
