@@ -245,10 +245,10 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
   };
   IcpResult icp = align_points(scan.points, radius_m, T_start, prior);
   if (!is_possible(icp)) icp = align_points(scan.points, std::min(radius_m, Matching::kNarrowSearch_m), T_start, prior);
-  // Unless a jolt or a turn back shows: what stands upright fits far better where the motion so far does not lead.
+  // A push or a sudden turn back: without the prior, far more of what stands upright fits.
   if (prior && icp.matched_sideways < Matching::kDoubtful * last_sideways_) {
-    const IcpResult free = align(radius_m, T_start);
-    if (free.matched_sideways * Matching::kDoubtful > icp.matched_sideways && is_possible(free)) icp = free;
+    const IcpResult alone = align(radius_m, T_start);
+    if (alone.matched_sideways * Matching::kDoubtful > icp.matched_sideways && is_possible(alone)) icp = alone;
   }
   // The second scan of a drive that began in motion: what was seen once fits, to some degree, where the sensor stands.
   if (scans_ == 1 && !measured_m)

@@ -95,6 +95,8 @@ class ScanMatcher {
  private:
   class Insertion;
   void wait() const;
+  // From `T_start`, which is `T_predicted` (where motion or wheels lead) or where the scan was found before; both since
+  // the scan before.
   ScanMatch match_within(double radius_m, double stamp_s, const MatcherScan& scan, const Pose& T_predicted,
                          const Pose& T_start, std::optional<double> measured_m, Search search) const;
   std::optional<PositionPrior> prior_at(double stamp_s, const MatcherScan& scan, const Pose& T_predicted,

@@ -25,7 +25,7 @@ class VelocityFilter {
 
   static constexpr double kFast_mps = 15.0;  ///< before anything is known
   Eigen::Vector3d velocity_mps_ = Eigen::Vector3d::Zero();
-  // Covariances.
+  // Covariances in the sensor's frame: m2, m2/s, m2/s2.
   Eigen::Matrix3d of_position_ = Eigen::Matrix3d::Zero(), of_both_ = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d of_velocity_ = kFast_mps * kFast_mps * Eigen::Matrix3d::Identity();
 };
