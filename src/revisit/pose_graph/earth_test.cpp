@@ -118,6 +118,11 @@ TEST(Earth, FewFixesPlaceNothing) {
   EXPECT_FALSE((*few)[0]);
   for (std::size_t i = 0; i < before.size(); ++i)
     EXPECT_LT((before[i].translation() - drive.graph.nodes()[i].translation()).norm(), 0.01);
+  auto vague = fixes(drive, at(0, 0, 1.0), 0);
+  for (EarthFix& fix : vague) fix.deviation_m.setConstant(200.0);
+  const auto by_vague = settle_on_earth(drive.graph, vague, drive.parts);
+  ASSERT_TRUE(by_vague);
+  EXPECT_FALSE((*by_vague)[0]) << "the way spreads by less than four of what they are off";
   std::vector<EarthFix> together;
   for (std::size_t i = 0; i < 5; ++i) together.push_back({0, Eigen::Vector3d(0.1, 0.2, 0.0), Eigen::Vector3d::Ones()});
   const auto placed = settle_on_earth(drive.graph, together, drive.parts);

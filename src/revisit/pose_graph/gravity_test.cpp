@@ -76,6 +76,25 @@ TEST(Gravity, AnAccelerometersOwnErrorBendsNothing) {
   EXPECT_LT(drive.worst_m(), 0.3 * before_m);
 }
 
+// A robot turns round, which makes what its accelerometer is off known, and pitches as it does. Ten degrees are more
+// than any accelerometer is off, and more likely the graph's, whose edge there may be off by five.
+TEST(Gravity, NoAccelerometerIsOffByTenDegrees) {
+  PoseGraph graph;
+  std::vector<UpReading> readings;
+  const double off_rad = to_radians(10.0);
+  for (std::size_t i = 0; i < 10; ++i) {
+    graph.add_node(planar_pose(0, 0, i < 5 ? 0.0 : kPi));
+    PoseEdge edge{i - 1, i, planar_pose(0, 0, i == 5 ? kPi : 0.0), 1e6 * Matrix6::Identity()};
+    if (i == 5) edge.information.diagonal().tail<3>().setConstant(std::pow(to_radians(5.0), -2));
+    if (i > 0) graph.add_edge(edge);
+    readings.push_back({i, Eigen::Vector3d(std::sin(off_rad), 0.0, std::cos(off_rad))});
+  }
+  graph.set_ups(std::move(readings));
+  ASSERT_TRUE(graph.optimise());
+  const double leans = graph.nodes()[0].linear().col(2).dot(graph.nodes()[9].linear().col(2));
+  EXPECT_GT(to_degrees(std::acos(leans)), 12.0);
+}
+
 TEST(Gravity, WrongReadingsLoseTheirWeight) {
   PitchingDrive drive;
   const double before_m = drive.worst_m();
@@ -132,6 +151,14 @@ TEST(Gravity, CountsLessWhereTheGraphDriftsLessThanItsEdgesSay) {
   EXPECT_NEAR(as_said, 0.3, 0.06) << "the noise that was put in";
   // Over 200 edges 5,000 square degrees are said, and 20 degrees drifted, whose square is 1.386 variances.
   EXPECT_NEAR(more_is_said, 0.3 * std::sqrt(5000.0 / (400.0 / 1.386)), 0.25);
+}
+
+// Where it drifts by little more than the readings vary, the readings' part in that is not the graph's: over half of
+// the way, 1 degree in one of two coordinates, beside twice the noise in both.
+TEST(Gravity, WhatReadingsVaryIsNoDriftOfTheGraph) {
+  double mean = 0.0;
+  for (unsigned seed = 0; seed < 20; ++seed) mean += deviation_deg(400, 1.0 / 200.0, 0.0, seed, false, 0.5) / 20.0;
+  EXPECT_NEAR(mean, 0.3 * std::sqrt(50.0 / 0.7), 0.2);
 }
 
 TEST(Gravity, ThirtyTwoReadingsAreEnoughToShowALargeDrift) {

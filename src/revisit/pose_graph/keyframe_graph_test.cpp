@@ -69,9 +69,19 @@ TEST(KeyframeGraph, ASegmentIsAttachedByALoopIntoWhatWasBefore) {
   within.query = {101};
   within.match = {100};
   EXPECT_FALSE(drive.graph.add_loop(within)) << "a loop within the segment says nothing about the rest";
+  EXPECT_FALSE(drive.graph.add_loop(OutAndBack::loop(kKeyframes - 1))) << "nor does one that ends before";
   within.match = {3};
   EXPECT_TRUE(drive.graph.add_loop(within));
   EXPECT_FALSE(drive.graph.last_attached());
+}
+
+TEST(KeyframeGraph, ASegmentIsAttachedByALoopToTheVeryLastBefore) {
+  OutAndBack drive;
+  drive.graph.add_keyframe({100}, {.segment = 1}, KeyframeGraph::OdometryEdge{});
+  LoopConstraint loop = OutAndBack::loop(0);
+  loop.match = {kKeyframes - 1};
+  loop.query = {100};
+  EXPECT_TRUE(drive.graph.add_loop(loop));
 }
 
 TEST(KeyframeGraph, OfTwoPartsTheLaterOneMovesToWhereTheLoopHasIt) {

@@ -276,6 +276,38 @@ TEST(LoopGate, ASessionGoesOnWhereItLostTrack) {
   EXPECT_EQ(gate.part(in_map(1, {60})), 0) << "four loops over nine metres";
 }
 
+// Where no odometry leads from an earlier loop to where track was lost, or between the matches, it does not say where
+// the robot was then.
+TEST(LoopGate, WhereASessionGoesOnIsToldByLoopsThatOdometryLeadsTo) {
+  const auto goes_on_by = [](const LoopConstraint& earlier) {
+    LoopGate gate;
+    TrajectoryPoint point;
+    const auto add = [&](FrameId frame, bool is_lost) {
+      point = is_lost ? TrajectoryPoint{.segment = point.segment + 1, .origin = point.segment + 1}
+                      : point.after(planar_pose(1, 0, 0));
+      gate.add_keyframe(frame, point);
+    };
+    for (int i = 0; i < 60; ++i) add({i}, false);
+    add(in_map(1, {0}), true);
+    for (int i = 1; i < 30; ++i) add(in_map(1, {i}), i == 1);  // track is lost after the first key frame
+    gate.restore(earlier);
+    gate.join(earlier);
+    std::size_t entered = 0;
+    for (int i = 1; i <= 10; i += 3) {
+      LoopConstraint after = loop(0, i, 0.0);
+      after.query = in_map(1, {i});
+      entered += gate.offer(after).size();
+    }
+    return entered > 0;
+  };
+  LoopConstraint earlier = loop(0, 0, 0.0);
+  earlier.query = in_map(1, {0});
+  EXPECT_TRUE(goes_on_by(earlier)) << "the session has one key frame before";
+  EXPECT_FALSE(goes_on_by(loop(30, 5, 0.0))) << "within the first session";
+  earlier.match = in_map(1, {20});
+  EXPECT_FALSE(goes_on_by(earlier)) << "within the second one";
+}
+
 TEST(LoopGate, LongAfterTheLastLoopFewDoNotShowThatItGoesOn) {
   const LoopGate gate = gate_that_lost_track(2.0, 70);
   ASSERT_EQ(gate.part(in_map(1, {10})), 0);

@@ -242,6 +242,24 @@ TEST(PoseGraph, ALoopIsBelievedOrRefusedAsAWhole) {
   EXPECT_EQ(weight_at(4.8), 0.0);
 }
 
+// Nor do others that were refused, nor readings of gravity that contradict one another, cast doubt on a loop that the
+// graph bends to: tried again, it would be refused as the dearer one.
+TEST(PoseGraph, ALoopIsBelievedBesideWhatIsRefused) {
+  for (const bool other_was_refused : {false, true}) {
+    PoseGraph graph;
+    for (int i = 0; i < 3; ++i) graph.add_node(planar_pose(i, 0, 0));
+    for (std::size_t i = 0; i < 2; ++i) graph.add_edge({i, i + 1, planar_pose(1, 0, 0), 100.0 * Matrix6::Identity()});
+    graph.add_edge({0, 2, planar_pose(2.0 + 1.35, 0, 0), 100.0 * Matrix6::Identity(), true});
+    if (other_was_refused) graph.add_edge({0, 2, planar_pose(40, 0, 0), 100.0 * Matrix6::Identity(), true, 0.0});
+    const Eigen::Vector3d leaning(std::sin(0.4), 0.0, std::cos(0.4));
+    graph.set_ups({{0}, {1}, {2}, {1, leaning}});
+    const auto report = graph.optimise();
+    ASSERT_TRUE(report) << report.error().message;
+    EXPECT_EQ(report->ups_refused, 1u);
+    EXPECT_EQ(graph.edges()[2].weight, 1.0) << other_was_refused;
+  }
+}
+
 TEST(PoseGraph, EdgesThatCannotBeAreRefused) {
   PoseGraph graph;
   EXPECT_TRUE(graph.optimise()) << "nothing to do";

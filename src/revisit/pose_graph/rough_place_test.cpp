@@ -9,8 +9,9 @@ namespace revisit::pose_graph_internal {
 namespace {
 
 // Fixes of a way: exactly where T has it, but for noise.
-FixPairs fixes_of(const std::vector<Eigen::Vector3d>& way, const Pose& T, double noise_m, double deviation_m = 0.5) {
-  std::mt19937 random(3);
+FixPairs fixes_of(const std::vector<Eigen::Vector3d>& way, const Pose& T, double noise_m, double deviation_m = 0.5,
+                  unsigned seed = 3) {
+  std::mt19937 random(seed);
   std::normal_distribution<double> noise(0.0, 1.0);
   FixPairs pairs;
   for (const Eigen::Vector3d& each : way) {
@@ -95,6 +96,35 @@ TEST(RoughPlace, CountsFixesByTheirDeviation) {
   ASSERT_TRUE(rough);
   expect_near(rough->T_earth_world, T, straight_way(), 0.3);
   for (const bool is_near : rough->is_near) EXPECT_TRUE(is_near);
+}
+
+// A way along x that leaves it by 10 m to both sides.
+std::vector<Eigen::Vector3d> winding_way() {
+  std::vector<Eigen::Vector3d> way;
+  for (int i = 0; i < 60; ++i) way.emplace_back(5.0 * i, i / 2 % 2 == 0 ? 10.0 : -10.0, 0.0);
+  return way;
+}
+
+// How it leans is told by what spreads across by eight deviations of the fixes.
+TEST(RoughPlace, AWayThatHardlyWindsIsPlacedUpright) {
+  const Pose T = somewhere(1.0, 0.1);
+  for (const auto& [deviation_m, upright] : {std::pair{1.2, false}, {1.3, true}}) {
+    const auto rough = place_roughly(fixes_of(winding_way(), T, 0.0, deviation_m));
+    ASSERT_TRUE(rough);
+    EXPECT_EQ(rough->T_earth_world.linear().col(2).isApprox(Eigen::Vector3d::UnitZ(), 1e-9), upright) << deviation_m;
+  }
+}
+
+// Fixes that are all off by ten of what they claim count all the same: the place is their mean, not that of a few.
+TEST(RoughPlace, FixesThatClaimTooMuchAreNoOutliers) {
+  const Pose T = somewhere(1.0, 0.0);
+  double squares = 0.0;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    const auto rough = place_roughly(fixes_of(straight_way(), T, 5.0, 0.5, seed));
+    ASSERT_TRUE(rough);
+    squares += (rough->T_earth_world * straight_way()[20] - T * straight_way()[20]).squaredNorm() / 20.0;
+  }
+  EXPECT_LT(std::sqrt(squares), 2.0) << "5 m in three coordinates over the root of 40: 1.4 m";
 }
 
 TEST(RoughPlace, NeedsFourFixesThatSpread) {
