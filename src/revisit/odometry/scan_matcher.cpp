@@ -184,7 +184,10 @@ std::optional<PositionPrior> ScanMatcher::prior_at(double stamp_s, const Matcher
     const double off_m = Matching::kWheels_m + Matching::kWheels * *measured_m;
     return PositionPrior{position_m, Eigen::Matrix3d::Identity() / (off_m * off_m)};
   }
-  if (!motion_ || scan.is_stamp_assumed || gap_s <= 0.0 || gap_s > Matching::kSparse_s) return std::nullopt;
+  // A start that was not tracked is often misjudged at first, and its speed with it.
+  const bool is_misjudged = start_was_untracked_ && scans_ < Matching::kScansToLearn;
+  if (!motion_ || is_misjudged || scan.is_stamp_assumed || gap_s <= 0.0 || gap_s > Matching::kSparse_s)
+    return std::nullopt;
   const Eigen::Matrix3d R = T_odom_predicted.linear();
   const Eigen::Matrix3d covariance_m2 = velocity_.covariance_after(gap_s, T_predicted.linear());
   return PositionPrior{position_m, R * covariance_m2.inverse() * R.transpose()};
@@ -371,6 +374,7 @@ void ScanMatcher::accept(double stamp_s, const MatcherScan& scan, const ScanMatc
     last_view_.set(scan.map_points, match.T_odom_lidar);
     T_odom_tracked_ = match.T_odom_lidar;
   }
+  start_was_untracked_ = start_was_untracked_ || (scans_ < Matching::kFirstScans && !match.is_tracked);
   ++scans_;
 }
 
@@ -388,6 +392,7 @@ void ScanMatcher::restart() {
   velocity_ = {};
   squared_prediction_error_m2_ = typical_match_ = last_sideways_ = 0.0;
   scans_ = 0;
+  start_was_untracked_ = false;
 }
 
 }  // namespace revisit

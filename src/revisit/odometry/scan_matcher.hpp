@@ -87,7 +87,8 @@ class ScanMatcher {
     if (has_map && !map_) map_ = std::make_unique<LocalMap>(1.0, 1.0);  // of whatever size the archive says
     if (has_map) fields(*map_);
     fields(T_odom_lidar_, motion_, velocity_, forgotten_from_, last_stamp_s_, range_m_, untracked_m_, T_odom_tracked_,
-           tracked_stamp_s_, squared_prediction_error_m2_, typical_match_, last_sideways_, scans_, rings_, last_view_);
+           tracked_stamp_s_, squared_prediction_error_m2_, typical_match_, last_sideways_, scans_, start_was_untracked_,
+           rings_, last_view_);
   }
 
   bool has_map() const { return map_ != nullptr; }
@@ -119,6 +120,7 @@ class ScanMatcher {
   double typical_match_ = 0.0;                ///< running mean of the share that met the map
   double last_sideways_ = 0.0;                ///< matched_sideways of the last scan that was tracked
   int scans_ = 0;                             ///< in the map
+  bool start_was_untracked_ = false;          ///< a scan among the first
   std::uint32_t rings_ = 0;
   LastView last_view_;  ///< of the last scan that was tracked
 };
