@@ -120,7 +120,7 @@ class ScanMatcher {
   double typical_match_ = 0.0;                ///< running mean of the share that met the map
   double last_sideways_ = 0.0;                ///< matched_sideways of the last scan that was tracked
   int scans_ = 0;                             ///< in the map
-  bool start_was_untracked_ = false;          ///< a scan among the first
+  bool start_was_untracked_ = false;          ///< one of the first five
   std::uint32_t rings_ = 0;
   LastView last_view_;  ///< of the last scan that was tracked
 };
