@@ -92,7 +92,12 @@ OdometryStep Odometry::match(const Scan& scan, double stamp_s, const std::option
     step.compensated = compensated(scan, *step.motion);
     if (first_scan_) begin_map_again(*step.motion);
   }
-  const auto T_guess = T_previous_lidar ? T_previous_lidar : motion_by_imu(stamp_s);
+  using Measured = MotionGuess::Measured;
+  std::optional<MotionGuess> guess;
+  if (T_previous_lidar)
+    guess = MotionGuess{*T_previous_lidar, is_guess ? Measured::kNothing : Measured::kAll};
+  else if (const auto T_turned = motion_by_imu(stamp_s))
+    guess = MotionGuess{*T_turned, Measured::kTurn};
   using Search = ScanMatcher::Search;
   MatcherScan thinned = matcher_.thinned(step.compensated.empty() ? scan.points : step.compensated);
   thinned.is_stamp_assumed = scan.is_stamp_assumed || scan.stamp_s < stamp_s;
@@ -100,7 +105,7 @@ OdometryStep Odometry::match(const Scan& scan, double stamp_s, const std::option
   // Before a scan is looked for elsewhere, its sweep is compensated again with the motion that was found, and matched
   // from there: that match measures how far it slides from where it was found first, not from the prediction.
   for (const Search search : {Search::kThere, Search::kAround}) {
-    match = matcher_.match(stamp_s, thinned, T_guess, !T_previous_lidar || is_guess, search);
+    match = matcher_.match(stamp_s, thinned, guess, search);
     if (is_swept && match.prediction_error_m > Following::kWrong_m) {
       const Twist found = with_imu(matcher_.motion_found(match.T_previous_found, stamp_s));
       std::vector<Point> again = compensated(scan, found);

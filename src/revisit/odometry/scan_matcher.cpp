@@ -7,6 +7,7 @@
 
 #include <oneapi/tbb/task_arena.h>
 #include <oneapi/tbb/task_group.h>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
 #include <revisit/odometry/motion_limits.hpp>
@@ -51,13 +52,15 @@ struct Matching {
   static constexpr double kLeastOfLastSideways = 0.3;
   static constexpr double kMostSlip = 0.6, kSlip_m = 0.1;   ///< of what wheels measure, and so much more
   static constexpr double kWheels_m = 0.02, kWheels = 0.1;  ///< standard deviation of what they measure
+  static constexpr double kFixed_m = 0.04;                  ///< a position that scans fix, a standard deviation
   static constexpr double kNarrowSearch_m = 0.3;            ///< where a wide search found what cannot be
   // The first scans of a sparse sensor meet few surfaces; those that they meet must fit.
   static constexpr int kFirstScans = 5;
   static constexpr double kStart_m = 1.0;  ///< tried on every side
   static constexpr double kFewestMatchedAtFirst = 0.1, kFittingAtFirst = 0.6;
   // Beside what is new: share of all points and of those that meet something; and share of all that was seen through.
-  static constexpr double kFewestBesideNew = 0.15, kFittingBesideNew = 0.7, kMostContradicted = 0.06;
+  static constexpr double kFewestBesideNew = 0.15, kFittingBesideNew = 0.7, kFittingAsForeseen = 0.5,
+                          kMostContradicted = 0.06;
 
   // A gap after which a prediction is no more than a guess. Another pose counts where so much more lies on what is
   // upright; one with less than so much of what the last scan had there is doubtful.
@@ -80,6 +83,11 @@ double median_range_m(std::span<const Point> points) {
   const auto middle = ranges.begin() + static_cast<std::ptrdiff_t>(ranges.size() / 2);
   std::nth_element(ranges.begin(), middle, ranges.end());
   return static_cast<double>(*middle);
+}
+
+bool fixes_position(const IcpResult& icp) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(icp.position_information, Eigen::EigenvaluesOnly);
+  return axes.eigenvalues()(0) * Matching::kFixed_m * Matching::kFixed_m >= 1.0;
 }
 
 std::vector<Eigen::Vector3f> in_map(const std::vector<Eigen::Vector3f>& points, const Pose& T_odom_lidar) {
@@ -156,48 +164,64 @@ bool ScanMatcher::is_credible(const IcpResult& icp, bool is_predicted) const {
                   typical_match_ - (is_predicted ? Matching::kBelowTypical : Matching::kBelowUnpredicted));
 }
 
-ScanMatch ScanMatcher::match(double stamp_s, const MatcherScan& scan, const std::optional<Pose>& T_previous_lidar,
-                             bool is_guess, Search search) const {
+ScanMatch ScanMatcher::match(double stamp_s, const MatcherScan& scan, const std::optional<MotionGuess>& guess,
+                             Search search) const {
+  using Measured = MotionGuess::Measured;
   const double gap_s = stamp_s - last_stamp_s_;
-  const bool extrapolates = motion_ && gap_s > 0.0 && gap_s <= Matching::kLongestExtrapolation_s;
-  const Pose T_predicted = T_previous_lidar ? *T_previous_lidar
-                           : extrapolates   ? motion_after(*motion_, gap_s)
-                                            : Pose::Identity();
-  std::optional<double> measured_m;
-  if (T_previous_lidar && !is_guess) measured_m = T_previous_lidar->translation().norm();
-  return match_within(map_ ? search_radius_m() : 0.0, stamp_s, scan, T_predicted, T_predicted, measured_m, search);
+  ScanMatch predicted;
+  if (guess) {
+    predicted.T_previous_predicted = guess->T_previous_lidar;
+    if (guess->measured == Measured::kAll) predicted.measured_m = guess->T_previous_lidar.translation().norm();
+    // Sensors of rings see all round, and are followed less well with it (docs/slam.md).
+    predicted.is_turn_measured = guess->measured == Measured::kTurn && rings_ == 0;
+  } else if (motion_ && gap_s > 0.0 && gap_s <= Matching::kLongestExtrapolation_s) {
+    predicted.T_previous_predicted = motion_after(*motion_, gap_s);
+  }
+  return match_within(map_ ? search_radius_m() : 0.0, stamp_s, scan, predicted, predicted.T_previous_predicted, search);
 }
 
 ScanMatch ScanMatcher::match_again(double stamp_s, const MatcherScan& scan, const ScanMatch& match,
                                    Search search) const {
-  return match_within(map_ ? fine_m() : 0.0, stamp_s, scan, match.T_previous_predicted, match.T_previous_found,
-                      match.measured_m, search);
+  return match_within(map_ ? fine_m() : 0.0, stamp_s, scan, match, match.T_previous_found, search);
 }
 
-// Where few surfaces fix the position, how the sensor moved so far tells more of it.
-std::optional<PositionPrior> ScanMatcher::prior_at(double stamp_s, const MatcherScan& scan, const Pose& T_predicted,
-                                                   std::optional<double> measured_m) const {
+// Where few surfaces fix the pose, how the sensor moved so far tells more of its position, and an IMU of its rotation.
+std::optional<PosePrior> ScanMatcher::prior_at(double stamp_s, const MatcherScan& scan,
+                                               const ScanMatch& predicted) const {
+  PosePrior prior;
+  prior.T_target_source = T_odom_lidar_ * predicted.T_previous_predicted;
+  prior.position_information = position_information_at(stamp_s, scan, predicted);
+  if (predicted.is_turn_measured) {
+    const double off_rad = imu_trust_.stddev_rad();
+    prior.rotation_information = Eigen::Matrix3d::Identity() / (off_rad * off_rad);
+  }
+  if (prior.position_information.isZero() && prior.rotation_information.isZero()) return std::nullopt;
+  return prior;
+}
+
+// Along the map's axes; zero where nothing is known.
+Eigen::Matrix3d ScanMatcher::position_information_at(double stamp_s, const MatcherScan& scan,
+                                                     const ScanMatch& predicted) const {
   const double gap_s = stamp_s - last_stamp_s_;
-  const Pose T_odom_predicted = T_odom_lidar_ * T_predicted;
-  const Eigen::Vector3d position_m = T_odom_predicted.translation();
-  if (measured_m) {
-    const double off_m = Matching::kWheels_m + Matching::kWheels * *measured_m;
-    return PositionPrior{position_m, Eigen::Matrix3d::Identity() / (off_m * off_m)};
+  if (predicted.measured_m) {
+    const double off_m = Matching::kWheels_m + Matching::kWheels * *predicted.measured_m;
+    return Eigen::Matrix3d::Identity() / (off_m * off_m);
   }
   // A start that was not tracked is often misjudged at first, and its speed with it.
   const bool is_misjudged = start_was_untracked_ && scans_ < Matching::kScansToLearn;
   if (!motion_ || is_misjudged || scan.is_stamp_assumed || gap_s <= 0.0 || gap_s > Matching::kSparse_s)
-    return std::nullopt;
-  const Eigen::Matrix3d R = T_odom_predicted.linear();
-  const Eigen::Matrix3d covariance_m2 = velocity_.covariance_after(gap_s, T_predicted.linear());
-  return PositionPrior{position_m, R * covariance_m2.inverse() * R.transpose()};
+    return Eigen::Matrix3d::Zero();
+  const Eigen::Matrix3d turn = predicted.T_previous_predicted.linear(), R = T_odom_lidar_.linear() * turn;
+  return R * velocity_.covariance_after(gap_s, turn).inverse() * R.transpose();
 }
 
-ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const MatcherScan& scan, const Pose& T_predicted,
-                                    const Pose& T_start, std::optional<double> measured_m, Search search) const {
+ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const MatcherScan& scan,
+                                    const ScanMatch& predicted, const Pose& T_start, Search search) const {
+  const std::optional<double> measured_m = predicted.measured_m;
   ScanMatch match;
   match.measured_m = measured_m;
-  match.T_previous_predicted = T_predicted;
+  match.is_turn_measured = predicted.is_turn_measured;
+  match.T_previous_predicted = predicted.T_previous_predicted;
   match.T_previous_lidar = match.T_previous_found = T_start;
   match.T_odom_lidar = normalised(T_odom_lidar_ * T_start);
   if (!map_) {
@@ -206,7 +230,7 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
   }
   wait();
   const auto align_points = [&](std::span<const Eigen::Vector3f> points, double width_m, const Pose& T_from,
-                                const std::optional<PositionPrior>& prior = {}) {
+                                const std::optional<PosePrior>& prior = {}) {
     IcpResult icp = align_icp(*map_, points, T_odom_lidar_ * T_from,
                               {.coarse_m = width_m,
                                .fine_m = std::min(width_m, fine_m()),
@@ -225,7 +249,7 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
   // Since the last scan that was tracked: the longer ago, the farther may the sensor be from where it was predicted.
   const double untracked_s = (stamp_s - tracked_stamp_s_) * (scan.is_stamp_assumed ? Matching::kLongestAssumed : 1.0);
   const MotionLimits limits(T_odom_lidar_ * T_start, untracked_s);
-  const auto prior = prior_at(stamp_s, scan, T_predicted, measured_m);
+  const auto prior = prior_at(stamp_s, scan, predicted);
   const auto is_possible = [&](const IcpResult& icp) {
     // Wheels slip, but not like this: it is the surroundings that move along with the sensor.
     const double found_m = (T_odom_tracked_.inverse() * icp.T_target_source).translation().norm();
@@ -234,11 +258,13 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
     return !motion_ || gap_s <= 0.0 || !limits.slides(icp);
   };
   const bool is_predicted = measured_m || untracked_s <= Matching::kLongestExtrapolation_s;
+  // An IMU that has told turns so far leaves none that is unforeseen: nothing is looked for elsewhere.
+  const bool is_turn_known = predicted.is_turn_measured && imu_trust_.is_trusted();
+  const double fitting = is_turn_known ? Matching::kFittingAsForeseen : Matching::kFittingBesideNew;
   // A narrow sensor that turns, or one that comes round a corner, sees mostly what is new: of the rest, most must fit.
   const auto fits_beside_new = [&](const IcpResult& icp) {
     if (scans_ < Matching::kFirstScans || !is_predicted || !icp.converged || !is_possible(icp) ||
-        !limits.is_near(icp) ||
-        icp.matched < std::max(Matching::kFewestBesideNew, Matching::kFittingBesideNew * icp.met))
+        !limits.is_near(icp) || icp.matched < std::max(Matching::kFewestBesideNew, fitting * icp.met))
       return false;
     return last_view_.contradicted(*map_, scan.points, icp.T_target_source, std::max(fine_m(), map_->voxel_m())) <=
            Matching::kMostContradicted;
@@ -252,6 +278,15 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
   if (prior && icp.matched_sideways < Matching::kDoubtful * last_sideways_) {
     const IcpResult alone = align(radius_m, T_start);
     if (alone.matched_sideways * Matching::kDoubtful > icp.matched_sideways && is_possible(alone)) icp = alone;
+  }
+  // Where scans fix little, a speed that was misjudged leads past the right optimum, scan after scan.
+  if (is_turn_known && prior && !fixes_position(icp)) {
+    Pose T_still = T_start;
+    T_still.translation().setZero();
+    for (const Pose& T_from : {T_start, T_still}) {
+      const IcpResult alone = align(Matching::kFarSearch_m, T_from);
+      if (alone.matched_sideways * Matching::kDoubtful > icp.matched_sideways && is_possible(alone)) icp = alone;
+    }
   }
   // The second scan of a drive that began in motion: what was seen once fits, to some degree, where the sensor stands.
   if (scans_ == 1 && !measured_m)
@@ -291,7 +326,7 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
   // With a few of the points; where these fit better, all are aligned.
   double best_of_few = 0.0;
   const auto try_from = [&](const Pose& T_tried, double turn_deg) {
-    if (search == Search::kThere || fits(icp)) return;
+    if (search == Search::kThere || is_turn_known || fits(icp)) return;
     const IcpResult tried = align_few(Matching::kFarSearch_m, T_tried * planar_pose(0.0, 0.0, to_radians(turn_deg)));
     if (tried.matched <= best_of_few) return;
     best_of_few = tried.matched;
@@ -344,6 +379,7 @@ void ScanMatcher::accept(double stamp_s, const MatcherScan& scan, const ScanMatc
       squared_prediction_error_m2_ +=
           share * (match.prediction_error_m * match.prediction_error_m - squared_prediction_error_m2_);
       typical_match_ += share * (match.matched - typical_match_);
+      if (match.is_turn_measured) imu_trust_.compare(match.T_previous_predicted, match.T_previous_lidar);
     }
     if (gap_s > 0.0 && gap_s <= Matching::kLongestGap_s) {
       velocity_.advance(gap_s, match.T_previous_lidar, match.position_information);

@@ -10,6 +10,7 @@
 #include <revisit/core/pose.hpp>
 #include <revisit/core/scan.hpp>
 #include <revisit/core/twist.hpp>
+#include <revisit/odometry/imu_trust.hpp>
 #include <revisit/odometry/last_view.hpp>
 #include <revisit/odometry/local_map.hpp>
 #include <revisit/odometry/velocity_filter.hpp>
@@ -25,6 +26,14 @@ struct MatcherScan {
   bool is_stamp_assumed = false;            ///< it may have been taken longer after the one before than its stamp says
 };
 
+/// The motion since the scan before: where the search begins, and the answer where the map gives none.
+struct MotionGuess {
+  /// All by wheels or another odometry, the turn by an IMU, or nothing.
+  enum class Measured : std::uint8_t { kAll, kTurn, kNothing };
+  Pose T_previous_lidar = Pose::Identity();
+  Measured measured = Measured::kAll;
+};
+
 /// Where one scan was matched.
 struct ScanMatch {
   Pose T_odom_lidar = Pose::Identity();          ///< at the scan's stamp; the first scan is the origin
@@ -38,6 +47,7 @@ struct ScanMatch {
   double met = 0.0;                  ///< share with a surface of the map nearby at all
   double prediction_error_m = 0.0;   ///< of a point at the median range
   std::optional<double> measured_m;  ///< what wheels say the sensor moved
+  bool is_turn_measured = false;     ///< an IMU says how T_previous_predicted is turned
   bool is_tracked = false;           ///< otherwise the pose is the predicted one
 };
 
@@ -66,11 +76,9 @@ class ScanMatcher {
   MatcherScan thinned(std::span<const Point> points) const;
   /// Where else a scan is looked for that does not fit where it is predicted.
   enum class Search : std::uint8_t { kThere, kAround };
-  /// Matches the scan with the map. `T_previous_lidar`, if there is one, is the motion since the scan before as wheels
-  /// or another odometry measured it: the guess, and the answer where the map gives none. `is_guess`: how far the
-  /// sensor went is not measured.
-  ScanMatch match(double stamp_s, const MatcherScan& scan, const std::optional<Pose>& T_previous_lidar = {},
-                  bool is_guess = false, Search search = Search::kAround) const;
+  /// Matches the scan with the map, which begins with the first one.
+  ScanMatch match(double stamp_s, const MatcherScan& scan, const std::optional<MotionGuess>& guess = {},
+                  Search search = Search::kAround) const;
   /// Matches a scan that was found at `match` once more, after its sweep was compensated with the motion found there.
   ScanMatch match_again(double stamp_s, const MatcherScan& scan, const ScanMatch& match,
                         Search search = Search::kAround) const;
@@ -88,7 +96,7 @@ class ScanMatcher {
     if (has_map) fields(*map_);
     fields(T_odom_lidar_, motion_, velocity_, forgotten_from_, last_stamp_s_, range_m_, untracked_m_, T_odom_tracked_,
            tracked_stamp_s_, squared_prediction_error_m2_, typical_match_, last_sideways_, scans_, start_was_untracked_,
-           rings_, last_view_);
+           imu_trust_, rings_, last_view_);
   }
 
   bool has_map() const { return map_ != nullptr; }
@@ -96,12 +104,12 @@ class ScanMatcher {
  private:
   class Insertion;
   void wait() const;
-  // From `T_start`, which is `T_predicted` (where motion or wheels lead) or where the scan was found before; both since
-  // the scan before.
-  ScanMatch match_within(double radius_m, double stamp_s, const MatcherScan& scan, const Pose& T_predicted,
-                         const Pose& T_start, std::optional<double> measured_m, Search search) const;
-  std::optional<PositionPrior> prior_at(double stamp_s, const MatcherScan& scan, const Pose& T_predicted,
-                                        std::optional<double> measured_m) const;
+  // From `T_start`, which is where the scan is predicted or where it was found before; since the scan before. Of
+  // `predicted`, what was predicted and what of it was measured.
+  ScanMatch match_within(double radius_m, double stamp_s, const MatcherScan& scan, const ScanMatch& predicted,
+                         const Pose& T_start, Search search) const;
+  std::optional<PosePrior> prior_at(double stamp_s, const MatcherScan& scan, const ScanMatch& predicted) const;
+  Eigen::Matrix3d position_information_at(double stamp_s, const MatcherScan& scan, const ScanMatch& predicted) const;
   double fine_m() const;
   double search_radius_m() const;
   bool is_credible(const IcpResult& icp, bool is_predicted) const;
@@ -121,6 +129,7 @@ class ScanMatcher {
   double last_sideways_ = 0.0;                ///< matched_sideways of the last scan that was tracked
   int scans_ = 0;                             ///< in the map
   bool start_was_untracked_ = false;          ///< one of the first five
+  ImuTrust imu_trust_;                        ///< of turns
   std::uint32_t rings_ = 0;
   LastView last_view_;  ///< of the last scan that was tracked
 };

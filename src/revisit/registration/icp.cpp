@@ -168,10 +168,15 @@ Eigen::Matrix3d position_information_of(const Equations& sum, const Pose& T) {
   return T.linear().transpose() * alone * T.linear() / variance_of_surfaces_m2(sum);
 }
 
-void add_prior(const PositionPrior& prior, const Pose& T, Equations& sum) {
-  const Eigen::Matrix3d H = variance_of_surfaces_m2(sum) * prior.information;
-  sum.H.topLeftCorner<3, 3>() += H;
-  sum.g.head<3>() += H * (T.translation() - prior.position_m);
+void add_prior(const PosePrior& prior, const Pose& T, Equations& sum) {
+  const double variance_m2 = variance_of_surfaces_m2(sum);
+  const Eigen::Matrix3d of_position = variance_m2 * prior.position_information,
+                        of_rotation = variance_m2 * prior.rotation_information;
+  const Eigen::AngleAxisd turned(T.linear() * prior.T_target_source.linear().transpose());
+  sum.H.topLeftCorner<3, 3>() += of_position;
+  sum.H.bottomRightCorner<3, 3>() += of_rotation;
+  sum.g.head<3>() += of_position * (T.translation() - prior.T_target_source.translation());
+  sum.g.tail<3>() += of_rotation * (turned.angle() * turned.axis());
 }
 
 // The step without its part along directions that next to nothing fixes (Zhang et al., "On degeneracy of

@@ -30,9 +30,10 @@ struct IcpResult {
 };
 
 /// Where a source is thought to be before it is compared.
-struct PositionPrior {
-  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();   ///< of its origin, in the target's frame
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< inverse covariance along the target's axes
+struct PosePrior {
+  Pose T_target_source = Pose::Identity();
+  /// Inverse covariances along the target's axes, 1/m2 and 1/rad2; zero where nothing is known.
+  Eigen::Matrix3d position_information = Eigen::Matrix3d::Zero(), rotation_information = Eigen::Matrix3d::Zero();
 };
 
 struct IcpOptions {
@@ -51,8 +52,8 @@ struct IcpOptions {
   /// pair weighed by the noise of points (this, a standard deviation) and the variance of its patch. Only they: along
   /// the ground a lorry beside is as certain as any wall.
   double noise_m = 0.0;
-  /// Weighed against what the surfaces say of the position (IcpResult::position_information).
-  std::optional<PositionPrior> prior = {};
+  /// Weighed against what the surfaces say, as points count in IcpResult::position_information.
+  std::optional<PosePrior> prior = {};
   /// Normals of the source, one a point: plane-to-plane (generalised ICP, Segal et al., RSS 2009, with the covariances
   /// of planes); empty: point-to-plane.
   std::span<const Eigen::Vector3f> source_normals = {};

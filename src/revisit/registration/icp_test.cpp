@@ -33,7 +33,7 @@ TEST(Icp, FindsAKnownMotionFromMetresAway) {
   EXPECT_GT(measure_agreement(a, b, result.T_target_source, 0.4).inlier_ratio, 0.7);
 }
 
-// Where nothing but ground is seen, a position is what was known before; where walls are, they tell.
+// Where nothing but ground is seen, position and heading are what was known before; where walls are, they tell.
 TEST(Icp, APriorTellsWhatSurfacesDoNot) {
   const auto seen = [](const SyntheticWorld& world, const Pose& T_world_lidar, unsigned seed) {
     const Scan scan = world.scan(T_world_lidar, {32, 900, -24.8, 5.0}, seed);
@@ -42,15 +42,18 @@ TEST(Icp, APriorTellsWhatSurfacesDoNot) {
   const SyntheticWorld plain(31, 60.0, 0), town(31);
   const Pose T = SyntheticWorld::at(0, 0, 0), T_true = planar_pose(0.2, 0.1, 0.0);
   IcpOptions options{.coarse_m = 1.0, .least_seen = 1e-3};
-  options.prior = PositionPrior{{0.5, -0.3, 0.0}, 100.0 * Eigen::Matrix3d::Identity()};
+  options.prior = PosePrior{planar_pose(0.5, -0.3, to_radians(3.0)), 100.0 * Eigen::Matrix3d::Identity(),
+                            1e4 * Eigen::Matrix3d::Identity()};
   const SurfaceCloud ground = seen(plain, T, 1), same_ground = seen(plain, T * T_true, 2);
   const IcpResult on_ground = align_icp(ground, same_ground.points(), Pose::Identity(), options);
   EXPECT_NEAR(on_ground.T_target_source.translation().x(), 0.5, 0.05);
   EXPECT_NEAR(on_ground.T_target_source.translation().y(), -0.3, 0.05);
   EXPECT_NEAR(on_ground.T_target_source.translation().z(), 0.0, 0.02) << "the ground tells the height";
+  EXPECT_NEAR(to_degrees(yaw_of(on_ground.T_target_source)), 3.0, 0.3);
   const SurfaceCloud walls = seen(town, T, 1), same_walls = seen(town, T * T_true, 2);
   const IcpResult in_town = align_icp(walls, same_walls.points(), Pose::Identity(), options);
   EXPECT_LT(error_m(in_town.T_target_source, T_true), 0.05);
+  EXPECT_LT(error_deg(in_town.T_target_source, T_true), 0.2);
   EXPECT_GT(in_town.position_information(0, 0), 5.0 * on_ground.position_information(0, 0));
   EXPECT_GT(in_town.position_information(2, 2), 3e3) << "most surfaces are ground: to two centimetres";
 }
