@@ -134,16 +134,19 @@ void RayScene::trace(std::span<const Ray> rays, Met* mets) const {
   query.mets = mets;
   alignas(64) int valid[kPacket] = {};
   RTCRayHit16 packet;
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    valid[i] = -1;
-    packet.ray.org_x[i] = rays[i].origin.x();
-    packet.ray.org_y[i] = rays[i].origin.y();
-    packet.ray.org_z[i] = rays[i].origin.z();
-    packet.ray.dir_x[i] = rays[i].direction.x();
-    packet.ray.dir_y[i] = rays[i].direction.y();
-    packet.ray.dir_z[i] = rays[i].direction.z();
+  if (rays.empty()) return;
+  // Embree may check the rays that are not valid as well: they are copies of the last one.
+  for (std::size_t i = 0; i < kPacket; ++i) {
+    const std::size_t k = std::min(i, rays.size() - 1);
+    if (i < rays.size()) valid[i] = -1;
+    packet.ray.org_x[i] = rays[k].origin.x();
+    packet.ray.org_y[i] = rays[k].origin.y();
+    packet.ray.org_z[i] = rays[k].origin.z();
+    packet.ray.dir_x[i] = rays[k].direction.x();
+    packet.ray.dir_y[i] = rays[k].direction.y();
+    packet.ray.dir_z[i] = rays[k].direction.z();
     packet.ray.tnear[i] = 0.f;
-    packet.ray.tfar[i] = mets[i].range_m;
+    packet.ray.tfar[i] = mets[k].range_m;
     packet.ray.time[i] = 0.f;
     packet.ray.mask[i] = ~0u;
     packet.ray.id[i] = static_cast<unsigned>(i);
