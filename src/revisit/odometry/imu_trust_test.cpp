@@ -18,7 +18,7 @@ ImuTrust after(int scans, double turn_deg, double factor, double off_deg) {
   return trust;
 }
 
-TEST(ImuTrust, GrowsInThreeSecondsOfTurnsThatAgree) {
+TEST(ImuTrust, GrowsWithTwentyTurnsThatAgree) {
   EXPECT_FALSE(after(10, 3.0, 1.0, 0.05).is_trusted());
   EXPECT_TRUE(after(20, 3.0, 1.0, 0.05).is_trusted());
   EXPECT_NEAR(to_degrees(after(200, 3.0, 1.0, 0.05).stddev_rad()), 0.29, 0.01);

@@ -58,7 +58,8 @@ struct Matching {
   static constexpr int kFirstScans = 5;
   static constexpr double kStart_m = 1.0;  ///< tried on every side
   static constexpr double kFewestMatchedAtFirst = 0.1, kFittingAtFirst = 0.6;
-  // Beside what is new: share of all points and of those that meet something; and share of all that was seen through.
+  // Beside what is new: share of all points, and of those that meet something (less where an IMU is trusted); and share
+  // of all that was seen through.
   static constexpr double kFewestBesideNew = 0.15, kFittingBesideNew = 0.7, kFittingAsForeseen = 0.5,
                           kMostContradicted = 0.06;
 
@@ -85,6 +86,7 @@ double median_range_m(std::span<const Point> points) {
   return static_cast<double>(*middle);
 }
 
+// Whether the scan by itself tells the position in every direction.
 bool fixes_position(const IcpResult& icp) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(icp.position_information, Eigen::EigenvaluesOnly);
   return axes.eigenvalues()(0) * Matching::kFixed_m * Matching::kFixed_m >= 1.0;
@@ -172,7 +174,7 @@ ScanMatch ScanMatcher::match(double stamp_s, const MatcherScan& scan, const std:
   if (guess) {
     predicted.T_previous_predicted = guess->T_previous_lidar;
     if (guess->measured == Measured::kAll) predicted.measured_m = guess->T_previous_lidar.translation().norm();
-    // Sensors of rings see all round, and are followed less well with it (docs/slam.md).
+    // A sensor of rings was followed less well with it (docs/slam.md).
     predicted.is_turn_measured = guess->measured == Measured::kTurn && rings_ == 0;
   } else if (motion_ && gap_s > 0.0 && gap_s <= Matching::kLongestExtrapolation_s) {
     predicted.T_previous_predicted = motion_after(*motion_, gap_s);
@@ -258,7 +260,7 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
     return !motion_ || gap_s <= 0.0 || !limits.slides(icp);
   };
   const bool is_predicted = measured_m || untracked_s <= Matching::kLongestExtrapolation_s;
-  // An IMU that has told turns so far leaves none that is unforeseen: nothing is looked for elsewhere.
+  // With an IMU that was right so far no turn is unforeseen, and nothing is looked for elsewhere.
   const bool is_turn_known = predicted.is_turn_measured && imu_trust_.is_trusted();
   const double fitting = is_turn_known ? Matching::kFittingAsForeseen : Matching::kFittingBesideNew;
   // A narrow sensor that turns, or one that comes round a corner, sees mostly what is new: of the rest, most must fit.
@@ -279,7 +281,7 @@ ScanMatch ScanMatcher::match_within(double radius_m, double stamp_s, const Match
     const IcpResult alone = align(radius_m, T_start);
     if (alone.matched_sideways * Matching::kDoubtful > icp.matched_sideways && is_possible(alone)) icp = alone;
   }
-  // Where scans fix little, a speed that was misjudged leads past the right optimum, scan after scan.
+  // Where scans fix little, a wrong speed would lead past the right pose in scan after scan.
   if (is_turn_known && prior && !fixes_position(icp)) {
     Pose T_still = T_start;
     T_still.translation().setZero();

@@ -28,7 +28,7 @@ struct MatcherScan {
 
 /// The motion since the scan before: where the search begins, and the answer where the map gives none.
 struct MotionGuess {
-  /// All by wheels or another odometry, the turn by an IMU, or nothing.
+  /// What of it was measured: all, by wheels or another odometry; the turn alone, by an IMU; nothing.
   enum class Measured : std::uint8_t { kAll, kTurn, kNothing };
   Pose T_previous_lidar = Pose::Identity();
   Measured measured = Measured::kAll;
@@ -104,8 +104,8 @@ class ScanMatcher {
  private:
   class Insertion;
   void wait() const;
-  // From `T_start`, which is where the scan is predicted or where it was found before; since the scan before. Of
-  // `predicted`, what was predicted and what of it was measured.
+  // Searches from `T_start`, a motion since the scan before: the predicted one, or the one that was found already. Of
+  // `predicted` only the prediction is read, and what of it was measured.
   ScanMatch match_within(double radius_m, double stamp_s, const MatcherScan& scan, const ScanMatch& predicted,
                          const Pose& T_start, Search search) const;
   std::optional<PosePrior> prior_at(double stamp_s, const MatcherScan& scan, const ScanMatch& predicted) const;
@@ -129,7 +129,7 @@ class ScanMatcher {
   double last_sideways_ = 0.0;                ///< matched_sideways of the last scan that was tracked
   int scans_ = 0;                             ///< in the map
   bool start_was_untracked_ = false;          ///< one of the first five
-  ImuTrust imu_trust_;                        ///< of turns
+  ImuTrust imu_trust_;                        ///< that it tells turns
   std::uint32_t rings_ = 0;
   LastView last_view_;  ///< of the last scan that was tracked
 };

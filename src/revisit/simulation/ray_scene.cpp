@@ -127,6 +127,7 @@ RayScene::RayScene(const RayScene& fixed, const Solids& moving, float time_reach
 RayScene::~RayScene() = default;
 
 void RayScene::trace(std::span<const Ray> rays, Met* mets) const {
+  if (rays.empty()) return;
   Query query;
   rtcInitIntersectContext(&query.context);
   query.context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
@@ -134,7 +135,6 @@ void RayScene::trace(std::span<const Ray> rays, Met* mets) const {
   query.mets = mets;
   alignas(64) int valid[kPacket] = {};
   RTCRayHit16 packet;
-  if (rays.empty()) return;
   // Embree may check the rays that are not valid as well: they are copies of the last one.
   for (std::size_t i = 0; i < kPacket; ++i) {
     const std::size_t k = std::min(i, rays.size() - 1);
