@@ -98,21 +98,20 @@ OdometryStep Odometry::match(const Scan& scan, double stamp_s, const std::option
     guess = MotionGuess{*T_previous_lidar, is_guess ? Measured::kNothing : Measured::kAll};
   else if (const auto T_turned = motion_by_imu(stamp_s))
     guess = MotionGuess{*T_turned, Measured::kTurn};
-  using Search = ScanMatcher::Search;
   MatcherScan thinned = matcher_.thinned(step.compensated.empty() ? scan.points : step.compensated);
   thinned.is_stamp_assumed = scan.is_stamp_assumed || scan.stamp_s < stamp_s;
   ScanMatch match;
   // Before a scan is looked for elsewhere, its sweep is compensated again with the motion that was found, and matched
   // from there: that match measures how far it slides from where it was found first, not from the prediction.
-  for (const Search search : {Search::kThere, Search::kAround}) {
-    match = matcher_.match(stamp_s, thinned, guess, search);
+  for (const SearchExtent extent : {SearchExtent::kThere, SearchExtent::kAround}) {
+    match = matcher_.match(stamp_s, thinned, guess, extent);
     if (is_swept && match.prediction_error_m > Following::kWrong_m) {
       const Twist found = with_imu(matcher_.motion_found(match.T_previous_found, stamp_s));
       std::vector<Point> again = compensated(scan, found);
       if (first_scan_) begin_map_again(found);
       MatcherScan thinned_again = matcher_.thinned(again);
       thinned_again.is_stamp_assumed = thinned.is_stamp_assumed;
-      const ScanMatch matched_again = matcher_.match_again(stamp_s, thinned_again, match, search);
+      const ScanMatch matched_again = matcher_.match_again(stamp_s, thinned_again, match, extent);
       if (matched_again.is_tracked) {
         match = matched_again;
         step.motion = found;
