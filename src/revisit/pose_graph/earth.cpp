@@ -97,7 +97,8 @@ Result<std::vector<std::optional<Pose>>> settle_on_earth(PoseGraph& graph, std::
   const auto settled = settle_best(extended, edges, near);
   if (!settled) return settled.error();
   const std::vector<Pose>& nodes = settled->graph.nodes();
-  for (std::size_t node = 0; node < graph.nodes().size(); ++node) graph.move_node(node, nodes[node]);
+  std::size_t node = 0;
+  for (const Pose& T : std::span(nodes).first(graph.nodes().size())) graph.move_node(node++, T);
   for (std::size_t part = 0; part < parts; ++part)
     if (rough[part]) T_earth_world[part] = nodes[earth[part]].inverse();
   return T_earth_world;

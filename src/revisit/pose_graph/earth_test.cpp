@@ -66,6 +66,7 @@ TEST(Earth, FixesUndoDriftAndTellHowTheMapLies) {
     ASSERT_GT(drive.worst_m(Pose::Identity()), 15.0);
     const auto placed = settle_on_earth(drive.graph, fixes(drive, T_earth_truth, jumps, times), drive.parts);
     ASSERT_TRUE(placed) << placed.error().message;
+    ASSERT_EQ(placed->size(), 1u);
     ASSERT_TRUE((*placed)[0]);
     EXPECT_LT(drive.worst_m(T_earth_truth.inverse() * *(*placed)[0]), 1.5)
         << jumps << " of 10 are jumps of " << 37.0 * times << " m";

@@ -29,27 +29,34 @@ using Vectors = std::vector<Eigen::Vector3d>;
 
 // How far readings of one sensor are from what they have in common, in the world. Those that are far off count little.
 Vectors errors_of(const PoseGraph& graph, const std::vector<const UpReading*>& readings) {
-  Vectors errors(readings.size());
-  std::vector<double> weights(readings.size(), 1.0), sizes(readings.size());
+  struct Weighed {
+    Eigen::Matrix3d R_world_node;
+    Eigen::Vector3d up, error;
+    double weight = 1.0;
+  };
+  std::vector<Weighed> all;
+  all.reserve(readings.size());
+  for (const UpReading* reading : readings) all.push_back({graph.nodes()[reading->node].linear(), reading->up, {}});
   Eigen::Vector3d off = Eigen::Vector3d::Zero();
   for (int round = 0; round < Weighing::kRounds; ++round) {
     Eigen::Vector3d up = Eigen::Vector3d::Zero(), more_off = Eigen::Vector3d::Zero();
     double sum = 0.0;
-    for (std::size_t i = 0; i < readings.size(); ++i)
-      up += weights[i] * (graph.nodes()[readings[i]->node].linear() * (readings[i]->up - off));
+    for (const Weighed& each : all) up += each.weight * (each.R_world_node * (each.up - off));
     up.normalize();
-    for (std::size_t i = 0; i < readings.size(); ++i) {
-      const auto R = graph.nodes()[readings[i]->node].linear();
-      errors[i] = R * (readings[i]->up - off) - up;
-      more_off += weights[i] * (R.transpose() * errors[i]);
-      sum += weights[i];
-      sizes[i] = errors[i].norm();
+    std::vector<double> sizes;
+    for (Weighed& each : all) {
+      each.error = each.R_world_node * (each.up - off) - up;
+      more_off += each.weight * (each.R_world_node.transpose() * each.error);
+      sum += each.weight;
+      sizes.push_back(each.error.norm());
     }
     off += more_off / sum;
-    const double usual = std::max(to_radians(Weighing::kLeast_deg), median(sizes));
-    for (std::size_t i = 0; i < readings.size(); ++i)
-      weights[i] = 1.0 / std::pow(1.0 + std::pow(sizes[i] / (2.0 * usual), 2), 2);
+    const double usual = std::max(to_radians(Weighing::kLeast_deg), median(std::move(sizes)));
+    for (Weighed& each : all) each.weight = 1.0 / std::pow(1.0 + std::pow(each.error.norm() / (2.0 * usual), 2), 2);
   }
+  Vectors errors;
+  errors.reserve(all.size());
+  for (const Weighed& each : all) errors.push_back(each.error);
   return errors;
 }
 

@@ -29,7 +29,9 @@ struct UpError {
 struct OffError {
   template <typename T>
   bool operator()(const T* off, T* residual) const {
-    for (int i = 0; i < 3; ++i) residual[i] = off[i] / to_radians(Gravity::kOff_deg);
+    using Vector = Eigen::Matrix<T, 3, 1>;
+    Eigen::Map<Vector> r(residual);
+    r = Eigen::Map<const Vector>(off) / T(to_radians(Gravity::kOff_deg));
     return true;
   }
 };
@@ -50,7 +52,6 @@ GravityTerms::GravityTerms(std::span<const UpReading> readings, const std::vecto
 
 void GravityTerms::add_to(ceres::Problem& problem, const std::function<double*(std::size_t)>& rotation_of) {
   // NOLINTBEGIN(cppcoreguidelines-owning-memory): the problem's
-  std::vector<bool> has_part(up_.size()), has_sensor(off_.size());
   for (const UpReading& each : readings_) {
     if (each.weight <= 0.0) continue;
     double* const up = up_[at(each.part)].data();
@@ -58,11 +59,12 @@ void GravityTerms::add_to(ceres::Problem& problem, const std::function<double*(s
     const double root = std::sqrt(each.weight) / each.deviation_rad;
     problem.AddResidualBlock(new ceres::AutoDiffCostFunction<UpError, 3, 4, 3, 3>(new UpError{each.up, root}), nullptr,
                              rotation_of(each.node), up, off);
-    if (!has_part[at(each.part)]) problem.SetManifold(up, new ceres::SphereManifold<3>);
-    if (!has_sensor[at(each.sensor)])
-      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<OffError, 3, 3>(new OffError), nullptr, off);
-    has_part[at(each.part)] = has_sensor[at(each.sensor)] = true;
   }
+  for (Eigen::Vector3d& up : up_)
+    if (problem.HasParameterBlock(up.data())) problem.SetManifold(up.data(), new ceres::SphereManifold<3>);
+  for (Eigen::Vector3d& off : off_)
+    if (problem.HasParameterBlock(off.data()))
+      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<OffError, 3, 3>(new OffError), nullptr, off.data());
   // NOLINTEND(cppcoreguidelines-owning-memory)
 }
 

@@ -41,8 +41,8 @@ void KeyframeGraph::bring_together(const LoopConstraint& loop) {
                              ? T_world_match * loop.T_match_query * T_world_query.inverse()
                              : T_world_query * loop.T_match_query.inverse() * T_world_match.inverse();
   const int moving = std::max(match_part, query_part);
-  for (std::size_t node = 0; node < keyframes_.size(); ++node)
-    if (gate_.part(keyframes_[node]) == moving) graph_.move_node(node, normalised(T_new_old * graph_.nodes()[node]));
+  for (const FrameId frame : keyframes_)
+    if (gate_.part(frame) == moving) graph_.move_node(node_of_.at(frame), normalised(T_new_old * T_world_lidar(frame)));
 }
 
 bool KeyframeGraph::add_loop(const LoopConstraint& loop) {

@@ -99,10 +99,7 @@ Solved solve(std::vector<Block>& blocks, const std::vector<PoseEdge>& edges, Gra
 }
 
 // What a measurement counts at this convexity, by its squared error as a share of the truncation.
-double weight_at(double error, double mu) {
-  const double low = mu / (mu + 1.0), high = (mu + 1.0) / mu;
-  return error <= low ? 1.0 : error >= high ? 0.0 : std::sqrt(mu * (mu + 1.0) / error) - mu;
-}
+double weight_at(double error, double mu) { return std::clamp(std::sqrt(mu * (mu + 1.0) / error) - mu, 0.0, 1.0); }
 
 }  // namespace
 
@@ -173,7 +170,8 @@ Result<PoseGraph::Report> PoseGraph::optimise(double settled) {
     for_each_doubtful([](double& weight, double) { weight = weight < 0.5 ? 0.0 : 1.0; });
     if (const Status status = solve_all(kIterationsAtLast); !status) return status.error();
   }
-  for (std::size_t i = 0; i < nodes_.size(); ++i) nodes_[i] = pose(i);
+  std::size_t i = 0;
+  for (Pose& node : nodes_) node = pose(i++);
   const auto is_refused = [](const auto& each) { return each.weight < 0.5; };
   report.loops_refused = static_cast<std::size_t>(std::count_if(edges_.begin(), edges_.end(), is_refused));
   report.ups_refused = static_cast<std::size_t>(std::count_if(ups_.begin(), ups_.end(), is_refused));

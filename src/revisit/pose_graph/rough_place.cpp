@@ -30,9 +30,10 @@ Pose align(const FixPairs& pairs, const std::vector<double>& weights, bool uprig
     mean_earth += weights[i] * pairs.earth[i];
   }
   mean_world /= sum, mean_earth /= sum;
+  // One factor less its mean is enough: what the other's mean is multiplied with sums up to nothing.
   Eigen::Matrix3d both = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < weights.size(); ++i)
-    both += weights[i] * (pairs.earth[i] - mean_earth) * (pairs.world[i] - mean_world).transpose();
+    both += weights[i] * (pairs.earth[i] - mean_earth) * pairs.world[i].transpose();
   Pose T = Pose::Identity();
   if (upright) {
     const double yaw_rad = std::atan2(both(1, 0) - both(0, 1), both(0, 0) + both(1, 1));
@@ -52,7 +53,7 @@ std::pair<double, double> spread_m(const std::vector<Eigen::Vector3d>& points) {
   for (const auto& p : points) mean += p;
   mean /= static_cast<double>(points.size());
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-  for (const auto& p : points) squares += (p - mean) * (p - mean).transpose();
+  for (const auto& p : points) squares += (p - mean) * p.transpose();
   const Eigen::Vector3d values =
       Eigen::JacobiSVD<Eigen::Matrix3d>(squares / static_cast<double>(points.size())).singularValues();
   return {std::sqrt(values[1]), std::sqrt(values[0])};
