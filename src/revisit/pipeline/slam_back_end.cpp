@@ -24,8 +24,6 @@ namespace {
 // stays as it is on known ground.
 constexpr double kKnownPlace_m = 1.0, kKnownPlace_deg = 20.0;
 
-constexpr double kLongestGap_s = 1.5, kKeptFixes_s = 10.0;  // between fixes; of those of a receiver at work
-
 bool is_near(const Pose& T) {
   return T.translation().norm() < kKnownPlace_m && rotation_angle(T) < to_radians(kKnownPlace_deg);
 }
@@ -227,46 +225,15 @@ Status SlamBackEnd::settle() {
 }
 
 Status SlamBackEnd::add_gps(const GpsFix& fix) {
-  if (!gps_.empty() && fix.stamp_s < gps_.back().stamp_s - kKeptFixes_s) {  // the clock was set back, or lied
-    gps_.clear();
-    without_fix_.clear();
-  }
-  if (!gps_.empty() && fix.stamp_s <= gps_.back().stamp_s) return ok();
-  gps_.push_back(fix);
-  for (const auto& [keyframe, stamp_s] : std::exchange(without_fix_, {}))
-    if (stamp_s > fix.stamp_s - kLongestGap_s && graph_.has(keyframe))
+  for (const auto& [keyframe, stamp_s] : fixes_.add(fix))
+    if (graph_.has(keyframe))
       if (const Status added = add_fix(keyframe, stamp_s); !added) return added;
-  while (gps_.front().stamp_s < fix.stamp_s - kKeptFixes_s) gps_.pop_front();
   return ok();
 }
 
-// The fix of a key frame, between the two that came before and after it. A receiver's error hardly changes from one key
-// frame to the next: of those that lie together, one is kept.
 Status SlamBackEnd::add_fix(FrameId keyframe, double stamp_s) {
-  constexpr double kApart_m = 10.0;
-  const Eigen::Vector3d at_m = graph_.T_world_lidar(keyframe).translation();
-  if (last_fix_at_m_ && (at_m - *last_fix_at_m_).norm() < kApart_m) return ok();
-  const auto after = std::lower_bound(gps_.begin(), gps_.end(), stamp_s,
-                                      [](const GpsFix& each, double time_s) { return each.stamp_s < time_s; });
-  if (after == gps_.end() && !gps_.empty() && gps_.back().stamp_s > stamp_s - kLongestGap_s)
-    without_fix_.emplace_back(keyframe, stamp_s);
-  if (after == gps_.begin() || after == gps_.end()) return ok();
-  const GpsFix &a = *(after - 1), &b = *after;
-  const double gap_s = b.stamp_s - a.stamp_s, share = (stamp_s - a.stamp_s) / gap_s;
-  const bool crosses = std::abs(a.longitude_deg - b.longitude_deg) > 180.0;  // the date line
-  if (!(gap_s > 0.0 && gap_s < kLongestGap_s) || crosses) return ok();
-  const auto between = [share](double from, double to) { return from + share * (to - from); };
-  GpsFix fix{stamp_s, between(a.latitude_deg, b.latitude_deg), between(a.longitude_deg, b.longitude_deg),
-             between(a.altitude_m, b.altitude_m), a.deviation_m.cwiseMax(b.deviation_m)};
-  const bool is_place =
-      std::abs(fix.latitude_deg) <= 90.0 && std::abs(fix.longitude_deg) <= 180.0 && std::isfinite(fix.altitude_m);
-  if (!is_place) return ok();
-  // Receivers that know nothing of their errors say 0, or infinite.
-  constexpr double kLeast_m = 1e-3, kUnknown_m = 5.0, kMost_m = 1e4;
-  for (double& each : fix.deviation_m)
-    each = std::isfinite(each) && each > 0.0 ? std::clamp(each, kLeast_m, kMost_m) : kUnknown_m;
-  last_fix_at_m_ = at_m;
-  return store_->add(StoredFix{keyframe, fix});
+  const auto fix = fixes_.fix_of(keyframe, stamp_s, graph_.T_world_lidar(keyframe).translation());
+  return fix ? store_->add(StoredFix{keyframe, *fix}) : ok();
 }
 
 // Readings are means over seconds: of those that share readings of the accelerometer, one is kept.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <deque>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -10,6 +9,7 @@
 #include <revisit/core/gps_fix.hpp>
 #include <revisit/odometry/odometry.hpp>
 #include <revisit/pipeline/detection.hpp>
+#include <revisit/pipeline/keyframe_fixes.hpp>
 #include <revisit/pipeline/place_recognition.hpp>
 #include <revisit/pose_graph/keyframe_graph.hpp>
 #include <revisit/store/sensor_facts.hpp>
@@ -31,7 +31,7 @@ class SlamBackEnd {
   /// An error where the store failed: it and the graph are then no longer the same.
   Result<Added> add_keyframe(PreparedScan scan, const OdometryStep& odometry, const SensorFacts& sensor);
   /// What a receiver said meanwhile, in the order of its times, by the recording's clock.
-  void set_gps(std::vector<GpsFix> fixes) { gps_.assign(fixes.begin(), fixes.end()); }
+  void set_gps(std::vector<GpsFix> fixes) { fixes_.set(std::move(fixes)); }
   /// The next one of a receiver at work.
   Status add_gps(const GpsFix& fix);
   /// A key frame of another map enters this one, and is looked for among the first `places` of it.
@@ -55,8 +55,8 @@ class SlamBackEnd {
   /// that goes on.
   Status restore(const StoredMap& map, const StoredSession& session, StateReader* state = nullptr);
   void archive(auto& fields) {
-    fields(gps_, without_fix_, last_fix_at_m_, last_up_s_, session_.sensor, facts_, graph_, recognition_,
-           newest_session_, stamp_shift_s_, newest_stamp_s_);
+    fields(fixes_, last_up_s_, session_.sensor, facts_, graph_, recognition_, newest_session_, stamp_shift_s_,
+           newest_stamp_s_);
   }
 
   /// Parts are counted by their segments: once some have gone, what the map says of its parts is written anew.
@@ -81,12 +81,10 @@ class SlamBackEnd {
   Status enter_keyframe(Entry entry, Result<Detection> detection, Added& added);
   Status enter(const std::vector<LoopGate::Decision>& decisions, std::size_t& entered);
 
-  std::deque<GpsFix> gps_;
-  std::vector<std::pair<FrameId, double>> without_fix_;  ///< the last key frames, and stamps: the fix after is to come
-  std::optional<Eigen::Vector3d> last_fix_at_m_;         ///< where in the graph the last one was that was kept
-  std::optional<double> last_up_s_;                      ///< likewise of gravity, when
   FrameTime time_in_index(const FrameTime& frame);
 
+  KeyframeFixes fixes_;
+  std::optional<double> last_up_s_;  ///< when the last reading of gravity was kept
   StoredSession session_;
   SensorFacts facts_;  ///< of this session
   Parameters parameters_;
