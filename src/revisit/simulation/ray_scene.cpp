@@ -135,7 +135,7 @@ void RayScene::trace(std::span<const Ray> rays, Met* mets) const {
   query.mets = mets;
   alignas(64) int valid[kPacket] = {};
   RTCRayHit16 packet;
-  // Embree may check the rays that are not valid as well: they are copies of the last one.
+  // Embree may check the rays that are not valid, and try them as well: they are the last one again, number and all.
   for (std::size_t i = 0; i < kPacket; ++i) {
     const std::size_t k = std::min(i, rays.size() - 1);
     if (i < rays.size()) valid[i] = -1;
@@ -149,7 +149,7 @@ void RayScene::trace(std::span<const Ray> rays, Met* mets) const {
     packet.ray.tfar[i] = mets[k].range_m;
     packet.ray.time[i] = 0.f;
     packet.ray.mask[i] = ~0u;
-    packet.ray.id[i] = static_cast<unsigned>(i);
+    packet.ray.id[i] = static_cast<unsigned>(k);
     packet.ray.flags[i] = 0;
     packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;

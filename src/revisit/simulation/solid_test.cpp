@@ -202,6 +202,24 @@ TEST_P(RayScenes, FindTheSameAsTryingEverything) {
   EXPECT_GT(ground, 150);
 }
 
+// Of a packet that is not full, Embree may try the rays that are not there: nothing beyond those that are is read or
+// written.
+TEST_P(RayScenes, APacketThatIsNotFullTouchesNothingElse) {
+  const Thicket thicket;
+  const RayScene scene(thicket.solids, thicket.cells, GetParam());
+  const std::vector<Ray> rays = rays_into(400 + RayScene::kPacket);
+  for (const std::size_t count : {1, 2, 7, 9, 15})
+    for (std::size_t i = 0; i < 400; ++i) {
+      std::array<Met, RayScene::kPacket> mets;
+      scene.trace(std::span(rays).subspan(i, count), mets.data());
+      for (std::size_t k = 0; k < RayScene::kPacket; ++k) {
+        const Met expected = k < count ? thicket.by_trying_all(rays[i + k]) : Met();
+        ASSERT_EQ(mets[k].range_m, expected.range_m) << k << " of " << count;
+        ASSERT_EQ(mets[k].what, expected.what);
+      }
+    }
+}
+
 INSTANTIATE_TEST_SUITE_P(InstructionSets, RayScenes,
                          ::testing::Values("", "isa=sse2", "isa=sse4.2", "isa=avx", "isa=avx2"));
 
