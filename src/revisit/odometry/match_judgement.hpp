@@ -24,7 +24,8 @@ class MatchJudgement {
   /// corner. Of the rest, most must fit.
   bool fits_beside_new(const IcpResult& found) const;
 
-  double gap_s() const { return gap_s_; }                ///< since the scan before
+  double gap_s() const { return gap_s_; }                                               ///< since the scan before
+  bool follows() const { return gap_s_ > 0.0 && gap_s_ <= TrackState::kLongestGap_s; }  ///< closely on that one
   double untracked_s() const { return untracked_s_; }    ///< since the last one that was tracked
   bool is_turn_known() const { return is_turn_known_; }  ///< by an IMU that was right so far
 

@@ -125,9 +125,8 @@ void ScanSearch::after_a_gap() {
 
 // A turn or a jolt that was not predicted, or the end of one. After a gap anything may fit somehow: nothing is tried.
 void ScanSearch::turned_a_little() {
-  const bool follows = judgement_.gap_s() > 0.0 && judgement_.gap_s() <= TrackState::kLongestGap_s;
   for (const double turn_deg : kTurnsTried_deg) {
-    if (turn_deg != 0.0 && !follows) break;
+    if (turn_deg != 0.0 && !judgement_.follows()) break;
     try_turned(T_previous_start_, turn_deg);
     try_turned(Pose::Identity(), turn_deg);
   }
@@ -135,8 +134,7 @@ void ScanSearch::turned_a_little() {
 
 // The longer ago it was tracked, the farther may it have turned; the nearest heading that fits is the answer.
 void ScanSearch::turned_since_tracked() {
-  const bool follows = judgement_.gap_s() > 0.0 && judgement_.gap_s() <= TrackState::kLongestGap_s;
-  if (!follows || scan_.points.size() < kFewestToTurn) return;
+  if (!judgement_.follows() || scan_.points.size() < kFewestToTurn) return;
   const Pose T_previous_tracked = track_.T_odom_lidar.inverse() * track_.T_odom_tracked;
   const double most_deg = std::min(180.0, kFastestTurn_degps * judgement_.untracked_s());
   for (double turn_deg = 0.0; turn_deg <= most_deg; turn_deg += kTurnStep_deg) {
