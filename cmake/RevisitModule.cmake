@@ -41,6 +41,8 @@ endfunction()
 add_library(revisit_flags INTERFACE)
 target_compile_options(revisit_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
   $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>  # GCC 12 warns of its own std::string
+  # In a unity build the file that is compiled is another than the one that holds a nameless namespace.
+  $<$<AND:$<CXX_COMPILER_ID:GNU>,$<BOOL:${CMAKE_UNITY_BUILD}>>:-Wno-subobject-linkage>
   # Nobody reads errno or flags of floating point: loops with roots and conditions become SIMD. No value changes.
   -fno-math-errno -fno-trapping-math)
 # Highway's target for processors that count bits in whole vectors (VPOPCNTDQ), the same for every file that chooses.

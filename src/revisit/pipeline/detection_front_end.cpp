@@ -37,6 +37,7 @@ Result<DetectionFrontEnd::Step> DetectionFrontEnd::step(Scan scan) {
   prepared->geometry = std::make_shared<ScanGeometry>(prepared->cloud);
   prepared->trajectory_point = point_ = next_point(step, *prepared);
   previous_ = prepared->geometry;
+  if (!awaits_motion_) narrow_view_.widen(*prepared);
   return Step{*std::move(prepared), odometry_ms, awaits_motion_.has_value(), std::move(previous)};
 }
 

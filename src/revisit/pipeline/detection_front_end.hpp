@@ -5,6 +5,7 @@
 #include <optional>
 
 #include <revisit/odometry/odometry.hpp>
+#include <revisit/pipeline/narrow_view.hpp>
 #include <revisit/pipeline/prepare.hpp>
 #include <revisit/verification/typical_agreement.hpp>
 
@@ -42,6 +43,7 @@ class DetectionFrontEnd {
   Odometry odometry_;
   ScanPreparation preparation_;
   TypicalAgreementEstimate typical_;
+  NarrowView narrow_view_;
   TrajectoryPoint point_;  ///< of the last scan
   struct Tracked {
     TrajectoryPoint point;

@@ -150,6 +150,7 @@ TEST(LoopDetector, ALoopLeadsBackToScansThatHadNone) {
   for (int i = 0; i < 8; ++i) ASSERT_TRUE(detector.process(scan_at(world, i, at(i), static_cast<unsigned>(i)), at(i)));
   const auto come = [&](int i, double open_deg) {
     Scan scan = scan_at(world, 1000 + i, at(i), 100U + static_cast<unsigned>(i));
+    scan.stamp_s = 100.0 + 1.5 * i;  // so slowly that none widens the view of the next
     auto detection = detector.process(sector_of(std::move(scan), open_deg), at(i));
     EXPECT_TRUE(detection);
     return *std::move(detection);

@@ -17,23 +17,39 @@ void RecentScans::add(const PreparedScan& scan) {
   const ThinCloud cloud = thin_surfaces(scan.scan.points, scan.ground.is_ground, kVoxel_m);
   Thinned thinned;
   thinned.at = *scan.trajectory_point;
+  thinned.stamp_s = scan.scan.stamp_s;
   for (std::size_t i = 0; i < cloud.points.size(); ++i)
-    thinned.points.push_back({cloud.points[i].x(), cloud.points[i].y(), cloud.points[i].z(), cloud.intensity[i]});
+    thinned.all.points.push_back({cloud.points[i].x(), cloud.points[i].y(), cloud.points[i].z(), cloud.intensity[i]});
+  thinned.all.is_ground = cloud.is_ground;
   scans_.push_back(std::move(thinned));
   if (scans_.size() > most_) scans_.pop_front();
 }
 
-std::vector<Point> RecentScans::together(std::size_t count) const {
-  std::vector<Point> points;
-  const std::size_t taken = std::min(count, scans_.size());
-  for (std::size_t i = scans_.size() - taken; i < scans_.size(); ++i) {
-    const Eigen::Isometry3f T_last_scan = T_between(scans_.back().at, scans_[i].at).cast<float>();
-    for (const Point& p : scans_[i].points) {
-      const Eigen::Vector3f moved = T_last_scan * Eigen::Vector3f(p.x, p.y, p.z);
-      points.push_back({moved.x(), moved.y(), moved.z(), p.intensity});
-    }
+void RecentScans::append(const Thinned& scan, Points& to) const {
+  const Eigen::Isometry3f T_last_scan = T_between(scans_.back().at, scan.at).cast<float>();
+  for (const Point& p : scan.all.points) {
+    const Eigen::Vector3f moved = T_last_scan * Eigen::Vector3f(p.x, p.y, p.z);
+    to.points.push_back({moved.x(), moved.y(), moved.z(), p.intensity});
   }
-  return points;
+  to.is_ground.insert(to.is_ground.end(), scan.all.is_ground.begin(), scan.all.is_ground.end());
+}
+
+std::vector<Point> RecentScans::together(std::size_t count) const {
+  Points all;
+  const std::size_t taken = std::min(count, scans_.size());
+  for (std::size_t i = scans_.size() - taken; i < scans_.size(); ++i) append(scans_[i], all);
+  return std::move(all.points);
+}
+
+RecentScans::Points RecentScans::before_last(double time_s, double distance_m) const {
+  Points all;
+  for (std::size_t i = 0; i + 1 < scans_.size(); ++i) {
+    const Thinned &scan = scans_[i], &last = scans_.back();
+    if (last.stamp_s - scan.stamp_s <= time_s && scan.at.segment == last.at.segment &&
+        T_between(last.at, scan.at).translation().norm() <= distance_m)
+      append(scan, all);
+  }
+  return all;
 }
 
 }  // namespace revisit

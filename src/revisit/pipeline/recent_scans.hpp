@@ -22,11 +22,22 @@ class RecentScans {
   /// Of the last `count` scans, metres, in the frame of the last one.
   std::vector<Point> together(std::size_t count) const;
 
+  struct Points {
+    std::vector<Point> points;
+    std::vector<std::uint8_t> is_ground;  ///< one a point
+  };
+  /// Of those before the last one, in its frame, that came at most so long before it, so near to it, and on the same
+  /// segment.
+  Points before_last(double time_s, double distance_m) const;
+
  private:
   struct Thinned {
-    std::vector<Point> points;
+    Points all;
     TrajectoryPoint at;
+    double stamp_s = 0.0;
   };
+  void append(const Thinned& scan, Points& to) const;
+
   std::size_t most_;
   std::deque<Thinned> scans_;
 };

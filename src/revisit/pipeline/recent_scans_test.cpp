@@ -40,5 +40,27 @@ TEST(RecentScans, ForgetWhatCameBeforeOdometryBeganAnew) {
   EXPECT_EQ(recent.together(3).size(), 1u);
 }
 
+TEST(RecentScans, BeforeTheLastAreThoseOfItsTimeItsSurroundingsAndItsSegment) {
+  const auto before_last = [](double x_m, double stamp_s, int segment) {
+    RecentScans recent(3);
+    PreparedScan earlier = scan_at(x_m, 0.3);
+    earlier.scan.stamp_s = stamp_s;
+    earlier.trajectory_point->segment = segment;
+    earlier.ground.is_ground = {1};
+    recent.add(earlier);
+    PreparedScan last = scan_at(0.0, 0.0);
+    last.scan.stamp_s = 10.0;
+    recent.add(last);
+    return recent.before_last(1.0, 3.0);
+  };
+  const auto found = before_last(2.5, 9.5, 0);
+  ASSERT_EQ(found.points.size(), 1u);
+  EXPECT_NEAR(found.points.front().x, 10.0, 1e-4);
+  EXPECT_EQ(found.is_ground, std::vector<std::uint8_t>{1});
+  EXPECT_TRUE(before_last(3.5, 9.5, 0).points.empty()) << "too far away";
+  EXPECT_TRUE(before_last(2.5, 8.5, 0).points.empty()) << "too long ago";
+  EXPECT_TRUE(before_last(2.5, 9.5, 1).points.empty()) << "odometry was lost in between";
+}
+
 }  // namespace
 }  // namespace revisit

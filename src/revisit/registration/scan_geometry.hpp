@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <utility>
 
 #include <revisit/registration/feature_alignment.hpp>
@@ -15,6 +16,13 @@ class ScanGeometry {
  public:
   explicit ScanGeometry(ThinCloud cloud) : surface_(std::move(cloud)) {}
   const SurfaceCloud& surface() const { return surface_; }
+  /// The surface together with what was seen before (ThinCloud::before); the surface, where nothing was.
+  const SurfaceCloud& widened() const {
+    if (!is_widened()) return surface_;
+    std::call_once(*once_widened_, [&] { widened_.emplace(with_before(surface_.cloud())); });
+    return *widened_;
+  }
+  bool is_widened() const { return surface_.cloud().before != nullptr; }
   /// Computed on the first call, with that call's radius.
   const Features& features(double radius_m) const {
     std::call_once(*once_, [&] { features_ = compute_features(surface_, radius_m); });
@@ -23,6 +31,8 @@ class ScanGeometry {
 
  private:
   SurfaceCloud surface_;
+  mutable std::optional<SurfaceCloud> widened_;
+  std::unique_ptr<std::once_flag> once_widened_ = std::make_unique<std::once_flag>();
   mutable Features features_;
   std::unique_ptr<std::once_flag> once_ = std::make_unique<std::once_flag>();
 };

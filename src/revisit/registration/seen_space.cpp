@@ -79,6 +79,14 @@ SeenSpace::SeenSpace(std::span<const Point> points) : cells_(kCells) {
   }
 }
 
+void SeenSpace::add(const SeenSpace& other) {
+  if (cells_.empty()) cells_.resize(other.cells_.size());
+  for (std::size_t i = 0; i < other.cells_.size(); ++i) {
+    cells_[i].nearest_cm = std::min(cells_[i].nearest_cm, other.cells_[i].nearest_cm);
+    cells_[i].farthest_cm = std::max(cells_[i].farthest_cm, other.cells_[i].farthest_cm);
+  }
+}
+
 SeenSpace::Verdict SeenSpace::look(const Eigen::Vector3f& p, float margin_m) const {
   const auto cell = cells_.empty() ? std::nullopt : cell_of(quick_direction(p.x(), p.y(), p.z()), p.x(), p.y(), p.z());
   if (!cell || cells_[*cell].farthest_cm == 0) return Verdict::kUnknown;

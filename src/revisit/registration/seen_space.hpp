@@ -27,6 +27,9 @@ class SeenSpace {
   /// `points` are finite, in the LiDAR's frame.
   explicit SeenSpace(std::span<const Point> points);
 
+  /// What another one saw from the same place, too.
+  void add(const SeenSpace& other);
+
   /// `p`, finite, in the scan's frame; `margin_m` is what the ranges may be off.
   Verdict look(const Eigen::Vector3f& p, float margin_m) const;
 

@@ -2,6 +2,7 @@
 #include <revisit/registration/surface_cloud.hpp>
 
 #include <algorithm>
+#include <utility>
 
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
@@ -77,6 +78,16 @@ SensorView view_of(const ThinCloud& cloud) {
 struct SurfaceCloud::Grid : registration_internal::ColumnGrid {
   using ColumnGrid::ColumnGrid;
 };
+
+ThinCloud with_before(ThinCloud cloud) {
+  const auto before = std::exchange(cloud.before, nullptr);
+  if (!before) return cloud;
+  cloud.points.insert(cloud.points.end(), before->points.begin(), before->points.end());
+  cloud.is_ground.insert(cloud.is_ground.end(), before->is_ground.begin(), before->is_ground.end());
+  cloud.intensity.insert(cloud.intensity.end(), before->intensity.begin(), before->intensity.end());
+  cloud.seen.add(before->seen);
+  return cloud;
+}
 
 SurfaceCloud::SurfaceCloud(ThinCloud cloud) : cloud_(std::move(cloud)) {
   if (cloud_.is_ground.size() != cloud_.points.size()) cloud_.is_ground.assign(cloud_.points.size(), 0);

@@ -25,12 +25,17 @@ struct ThinCloud {
   float voxel_m = 1.f;
   Eigen::Vector3f up = Eigen::Vector3f::UnitZ();  ///< from the ground: another than z where the sensor is tilted
   SeenSpace seen;                                 ///< of the scan it was thinned from
+  /// What scans shortly before saw and this one did not, in its frame; null where nobody asked (pipeline/narrow_view).
+  std::shared_ptr<const ThinCloud> before;
 
   void archive(auto& fields) {
     fields(points, is_ground, intensity, voxel_m, up, seen);
     fields.require(is_ground.size() == points.size() && intensity.size() == points.size() && voxel_m > 0.f);
   }
 };
+
+/// A cloud and what was seen before it, as one.
+ThinCloud with_before(ThinCloud cloud);
 
 /// Thins `points`, which are finite, with cubic voxels of `voxel_m`; points more than 1,024 voxels out are taken
 /// together. `is_ground` has one entry a point or is empty (nothing is ground). Throws std::invalid_argument for no
@@ -65,6 +70,7 @@ class SurfaceCloud final : public Surface {
   SurfaceCloud(SurfaceCloud&&) noexcept;
   SurfaceCloud& operator=(SurfaceCloud&&) noexcept;
 
+  const ThinCloud& cloud() const { return cloud_; }
   std::size_t size() const { return cloud_.points.size(); }
   std::span<const Eigen::Vector3f> points() const { return cloud_.points; }
   std::span<const Eigen::Vector3f> normals() const { return normals_; }

@@ -6,7 +6,9 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <memory>
 #include <type_traits>
+#include <utility>
 
 namespace revisit {
 namespace {
@@ -109,17 +111,17 @@ std::optional<IntensityScanContext> to_descriptor(std::span<const std::byte> byt
   return descriptor;
 }
 
-Bytes to_bytes(const ThinCloud& cloud) {
-  Writer writer;
+namespace {
+
+void put(const ThinCloud& cloud, Writer& writer) {
   writer.put(cloud.voxel_m)
       .put(Position{cloud.up.x(), cloud.up.y(), cloud.up.z()})
       .put(static_cast<std::uint32_t>(cloud.points.size()));
   for (const Eigen::Vector3f& p : cloud.points) writer.put(Position{p.x(), p.y(), p.z()});
-  return writer.put_counted(cloud.is_ground).put_counted(cloud.intensity).put_counted(cloud.seen.ranges_cm()).take();
+  writer.put_counted(cloud.is_ground).put_counted(cloud.intensity).put_counted(cloud.seen.ranges_cm());
 }
 
-std::optional<ThinCloud> to_thin_cloud(std::span<const std::byte> bytes) {
-  Reader reader(bytes);
+std::optional<ThinCloud> get_thin_cloud(Reader& reader) {
   ThinCloud cloud;
   cloud.voxel_m = reader.get<float>();
   const auto up = reader.get<Position>();
@@ -129,11 +131,31 @@ std::optional<ThinCloud> to_thin_cloud(std::span<const std::byte> bytes) {
   cloud.intensity = reader.get_counted<float>();
   auto seen = SeenSpace::from_ranges_cm(reader.get_counted<std::uint16_t>());
   const std::size_t count = cloud.points.size();
-  if (!reader.is_at_end() || !seen || cloud.is_ground.size() != count || cloud.intensity.size() != count ||
-      !(cloud.voxel_m > 0.f) || !(std::abs(cloud.up.norm() - 1.f) < 1e-3f) ||
+  if (!seen || cloud.is_ground.size() != count || cloud.intensity.size() != count || !(cloud.voxel_m > 0.f) ||
+      !(std::abs(cloud.up.norm() - 1.f) < 1e-3f) ||
       !std::all_of(cloud.points.begin(), cloud.points.end(), [](const Eigen::Vector3f& p) { return p.allFinite(); }))
     return std::nullopt;
   cloud.seen = *std::move(seen);
+  return cloud;
+}
+
+}  // namespace
+
+// What was seen before follows it, where there is something.
+Bytes to_bytes(const ThinCloud& cloud) {
+  Writer writer;
+  put(cloud, writer);
+  if (cloud.before) put(*cloud.before, writer);
+  return writer.take();
+}
+
+std::optional<ThinCloud> to_thin_cloud(std::span<const std::byte> bytes) {
+  Reader reader(bytes);
+  auto cloud = get_thin_cloud(reader);
+  if (!cloud || reader.is_at_end()) return cloud;
+  auto before = get_thin_cloud(reader);
+  if (!before || !reader.is_at_end()) return std::nullopt;
+  cloud->before = std::make_shared<const ThinCloud>(*std::move(before));
   return cloud;
 }
 

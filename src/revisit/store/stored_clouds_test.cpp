@@ -59,6 +59,19 @@ TEST(StoredClouds, InAFileThatNobodySees) {
   gives_back(*clouds_in_file(1), stored.clouds);
 }
 
+TEST(StoredClouds, InAFileWithWhatWasSeenBefore) {
+  const Stored stored("before");
+  std::vector<ThinCloud> with = stored.clouds;
+  for (std::size_t i = 0; i < with.size(); i += 2) with[i].before = std::make_shared<const ThinCloud>(stored.clouds[1]);
+  const auto clouds = clouds_in_file(1);
+  gives_back(*clouds, with);
+  for (std::size_t i = 0; i < with.size(); ++i) {
+    const auto cloud = *clouds->get({static_cast<std::int64_t>(i)});
+    ASSERT_EQ(cloud->before != nullptr, with[i].before != nullptr) << "place " << i;
+    if (cloud->before) EXPECT_EQ(to_bytes(*cloud->before), to_bytes(stored.clouds[1])) << "place " << i;
+  }
+}
+
 TEST(StoredClouds, WithoutAFileTheyStayInMemory) {
   const Stored stored("no_file");
   setenv("TMPDIR", "/nowhere", 1);

@@ -27,6 +27,13 @@ const double kYawMargin_rad = to_radians(3.0);
 // were in another street: where both are narrow, 6 less everywhere.
 constexpr double kUnknownInTheOpen_log_odds = -3.0, kUnknownOtherwise_log_odds = -6.0;
 
+// Chosen on walks through two yards (docs/accuracy.md, "A narrow view, widened").
+struct Wider {
+  static constexpr double kLeastAlone_log_odds = 0.0;
+  static constexpr double kMostStddevAlone_m = 0.2;  ///< twice of what is asked otherwise
+  static constexpr double kMostBeside_m = 0.25;
+};
+
 // Of the least overlap: a scan that comes alone has no other one beside it that may overlap more.
 constexpr double kLessForOneAlone = 2.0 / 3.0;
 
@@ -174,6 +181,7 @@ void CandidateRegistration::register_scans(Hypothesis& hypothesis, const PosePre
   };
   hypothesis.geometric = register_from(hypothesis.T_guess_match_query);
   judge(hypothesis, prediction);
+  look_wider(hypothesis, prediction);
   if (!options_.follow || !hypothesis.is_accepted()) return;
   // A registration that begins metres away may end beside the right pose. Where the loops before have another pose, a
   // second one begins there; of the two poses the one that the scans fit better counts.
@@ -184,6 +192,24 @@ void CandidateRegistration::register_scans(Hypothesis& hypothesis, const PosePre
   again.geometric = register_from(*T_by_loops);
   judge(again, prediction);
   if (again.own_log_odds() > hypothesis.own_log_odds()) hypothesis = std::move(again);
+}
+
+// Where two scans alone make a place likely but not sure, or hardly fix its position, what was seen shortly before them
+// may decide. Laid together by odometry, it is as crooked as odometry was meanwhile: both must find the same pose.
+void CandidateRegistration::look_wider(Hypothesis& hypothesis, const PosePrediction* prediction) const {
+  using Reason = Refusal::Reason;
+  const GeometricEvidence& alone = *hypothesis.geometric;
+  if (!hypothesis.refusal ||
+      (hypothesis.refusal->reason != Reason::kImprobable && hypothesis.refusal->reason != Reason::kSlides))
+    return;
+  if (alone.own_log_odds < Wider::kLeastAlone_log_odds || alone.evidence.stddev_m > Wider::kMostStddevAlone_m) return;
+  if (!hypothesis.geometry->is_widened() && !query_geometry_->is_widened()) return;
+  Hypothesis wider = hypothesis;
+  wider.geometric = check_widened(*hypothesis.geometry, *query_geometry_,
+                                  {alone.T_match_query, hypothesis.overlap, context_.typical}, options_);
+  judge(wider, prediction);
+  const Eigen::Vector3d beside_m = wider.geometric->T_match_query.translation() - alone.T_match_query.translation();
+  if (wider.is_accepted() && beside_m.norm() <= Wider::kMostBeside_m) hypothesis = std::move(wider);
 }
 
 void CandidateRegistration::judge(Hypothesis& hypothesis, const PosePrediction* prediction) const {

@@ -82,6 +82,8 @@ class CandidateRegistration {
   void register_scans(Hypothesis& hypothesis, const PosePrediction* prediction = nullptr) const;
   /// Accepts or refuses a pose that was registered, with what odometry and the loops before say of it.
   void judge(Hypothesis& hypothesis, const PosePrediction* prediction) const;
+  /// Tests a refused pose again, with what was seen before the two scans (ThinCloud::before).
+  void look_wider(Hypothesis& hypothesis, const PosePrediction* prediction) const;
   Pose from_upright(const Hypothesis& hypothesis, const Pose& T_match_query_upright) const;
 
   const VerificationContext& context_;

@@ -179,5 +179,64 @@ TEST_F(CandidateRegistrationTest, APlaceThatLooksTheSameTurnedIsRefusedForItsHea
   EXPECT_EQ(found.refusal->reason, Refusal::Reason::kOtherHeading) << "86 degrees off in a metre";
 }
 
+// Two scans of 60 degrees from one place, taken by a sensor that had looked round before.
+class WiderViewTest : public CandidateRegistrationTest {
+ protected:
+  Described narrow(const Pose& T_world_lidar, bool is_widened, const Pose& T_error = Pose::Identity()) const {
+    Described scan = described(home_, T_world_lidar, 60.0);
+    if (!is_widened) return scan;
+    ThinCloud before = described(home_, T_world_lidar * T_error, 220.0).cloud;
+    scan.cloud.before = std::make_shared<const ThinCloud>(std::move(before));
+    return scan;
+  }
+  Hypothesis found(const Described& query, const Described& place) {
+    add(70, place, std::nullopt);
+    geometries_ = {};
+    parameters_.geometric.overhead_search = false;  // it would find little in common
+    const VerificationContext known = context();
+    const VerificationQuery question{FrameId{1000}, query.descriptor, query.cloud, nullptr, std::nullopt};
+    return CandidateRegistration(known, question).test(candidates(query, {70}))->front();
+  }
+  Pose T_place_narrow() const { return T_world_place_.inverse() * T_world_narrow_; }
+  const Pose T_world_place_ = SyntheticWorld::at(2, 0, 0), T_world_narrow_ = SyntheticWorld::at(2.4, 0.3, 0.1);
+};
+
+TEST_F(WiderViewTest, WhatWasSeenBeforeDecidesWhereTwoScansDoNot) {
+  const Described query = narrow(T_world_narrow_, true), place = narrow(T_world_place_, true);
+  parameters_.geometric.min_probability = 0.0;
+  const double alone = found(narrow(T_world_narrow_, false), narrow(T_world_place_, false)).geometric->log_odds;
+  const Described all_round = {query.descriptor, with_before(query.cloud)};
+  const double together = found(all_round, {place.descriptor, with_before(place.cloud)}).geometric->log_odds;
+  ASSERT_GT(together, alone + 1.0);
+  parameters_.geometric.min_probability = probability_of((alone + together) / 2.0);
+  EXPECT_FALSE(found(narrow(T_world_narrow_, false), narrow(T_world_place_, false)).is_accepted());
+  const Hypothesis wider = found(query, place);
+  ASSERT_TRUE(wider.is_accepted());
+  EXPECT_LT((wider.geometric->T_match_query.translation() - T_place_narrow().translation()).norm(), 0.1);
+}
+
+TEST_F(WiderViewTest, ButNotWhereItHasAnotherPose) {
+  parameters_.geometric.min_probability = 0.0;
+  const double alone = found(narrow(T_world_narrow_, false), narrow(T_world_place_, false)).geometric->log_odds;
+  parameters_.geometric.min_probability = probability_of(alone + 0.1);
+  EXPECT_TRUE(found(narrow(T_world_narrow_, true), narrow(T_world_place_, true)).is_accepted());
+  const Described crooked = narrow(T_world_place_, true, planar_pose(0.8, 0.0, 0.0));
+  EXPECT_FALSE(found(narrow(T_world_narrow_, true), crooked).is_accepted());
+}
+
+// What was dark is bright, as in a place that has the same walls.
+TEST_F(WiderViewTest, NorWhereTheScansThemselvesSpeakAgainstIt) {
+  Described repainted = narrow(T_world_narrow_, true);
+  for (float& each : repainted.cloud.intensity) each = 1.f - each;
+  const Described place = narrow(T_world_place_, true);
+  const auto together = [&] {
+    return check_widened(ScanGeometry(place.cloud), ScanGeometry(repainted.cloud), {T_place_narrow()},
+                         parameters_.geometric);
+  };
+  parameters_.geometric.min_probability = probability_of(together().own_log_odds - 0.1);
+  ASSERT_TRUE(together().is_consistent()) << "what was seen before would do";
+  EXPECT_FALSE(found(repainted, place).is_accepted());
+}
+
 }  // namespace
 }  // namespace revisit

@@ -94,6 +94,11 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
 
 }  // namespace
 
+GeometricEvidence check_widened(const ScanGeometry& match, const ScanGeometry& query, const CandidateView& view,
+                                const GeometricOptions& options) {
+  return register_from(match.widened(), query.widened(), view, options);
+}
+
 void refine(GeometricEvidence& found, const ScanGeometry& match, const ScanGeometry& query) {
   const IcpResult icp = align_icp(match.surface(), query.surface().points(), found.T_match_query,
                                   {.coarse_m = Refinement::kCoarse_m,

@@ -57,6 +57,10 @@ struct CandidateView {
 GeometricEvidence check_geometric(const ScanGeometry& match, const ScanGeometry& query, const CandidateView& view,
                                   const GeometricOptions& options);
 
+/// check_geometric() from the guess alone, with what was seen before each of the scans (ThinCloud::before).
+GeometricEvidence check_widened(const ScanGeometry& match, const ScanGeometry& query, const CandidateView& view,
+                                const GeometricOptions& options);
+
 /// Makes the pose of what was accepted as exact as the scans allow: a quarter of the error with 16 lines.
 void refine(GeometricEvidence& found, const ScanGeometry& match, const ScanGeometry& query);
 
