@@ -10,8 +10,8 @@ namespace revisit {
 /// little of a place. Belongs to one thread at a time.
 class NarrowView {
  public:
-  /// Gives the scan, which has its trajectory point, ThinCloud::before, where it sees less than half of what is around.
-  /// Others are left as they are.
+  /// Sets ThinCloud::before of a scan that sees less than half of what is around, and leaves others as they are. The
+  /// scan must have its geometry and its trajectory point; scans come in the order in which they were taken.
   void widen(PreparedScan& scan);
 
  private:

@@ -26,8 +26,8 @@ class RecentScans {
     std::vector<Point> points;
     std::vector<std::uint8_t> is_ground;  ///< one a point
   };
-  /// Of those before the last one, in its frame, that came at most so long before it, so near to it, and on the same
-  /// segment.
+  /// Of the scans before the last one, in its frame, metres: those taken at most `time_s` before it and within
+  /// `distance_m` of it, on the same segment of odometry.
   Points before_last(double time_s, double distance_m) const;
 
  private:

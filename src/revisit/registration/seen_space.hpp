@@ -27,7 +27,7 @@ class SeenSpace {
   /// `points` are finite, in the LiDAR's frame.
   explicit SeenSpace(std::span<const Point> points);
 
-  /// What another one saw from the same place, too.
+  /// From now on also what `other`, of the same frame, saw.
   void add(const SeenSpace& other);
 
   /// `p`, finite, in the scan's frame; `margin_m` is what the ranges may be off.
@@ -40,6 +40,7 @@ class SeenSpace {
     float width_rad = 6.2831853f;
 
     bool is_all_round() const { return least_cosine <= -1.f; }
+    bool is_narrow() const { return width_rad < 3.14f; }  ///< less than half of what is around
     bool holds(const Eigen::Vector2f& p) const { return is_all_round() || p.dot(middle) >= least_cosine * p.norm(); }
   };
   Sector sector() const;

@@ -195,7 +195,7 @@ void CandidateRegistration::register_scans(Hypothesis& hypothesis, const PosePre
 }
 
 // Where two scans alone make a place likely but not sure, or hardly fix its position, what was seen shortly before them
-// may decide. Laid together by odometry, it is as crooked as odometry was meanwhile: both must find the same pose.
+// may decide. It was joined by odometry and has its errors, so both registrations must find the same pose.
 void CandidateRegistration::look_wider(Hypothesis& hypothesis, const PosePrediction* prediction) const {
   using Reason = Refusal::Reason;
   const GeometricEvidence& alone = *hypothesis.geometric;

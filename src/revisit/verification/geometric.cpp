@@ -35,7 +35,6 @@ struct Refinement {
 struct Differing {
   static constexpr double kDown = 1.5, kDownALittle = 1.15, kUp = 3.0;  ///< ratios of slopes
   static constexpr float kNarrower_rad = 1.05f;                         ///< of the sectors that they see
-  static constexpr float kHalfOfAll_rad = 3.14f;                        ///< a sector is narrow below
   /// Of what fits between two scans of one sensor, and of its residual: each thins what it sees by where its own lines
   /// lie.
   static constexpr double kShare = 0.8, kResidual = 1.13;
@@ -68,9 +67,10 @@ GeometricEvidence register_from(const SurfaceCloud& match, const SurfaceCloud& q
   LoopEvidence& all = evidence.evidence;
   all.inlier_ratio = agreement.inlier_ratio;
   all.sensors_differ = sensors_differ(match.view(), query.view());
-  const auto [narrower_rad, wider_rad] = std::minmax(match.view().sector.width_rad, query.view().sector.width_rad);
-  all.one_is_narrow = narrower_rad < Differing::kHalfOfAll_rad && wider_rad - narrower_rad > Differing::kNarrower_rad;
-  all.both_are_narrow = wider_rad < Differing::kHalfOfAll_rad;
+  const SeenSpace::Sector &one = match.view().sector, &other = query.view().sector;
+  all.one_is_narrow =
+      (one.is_narrow() || other.is_narrow()) && std::abs(one.width_rad - other.width_rad) > Differing::kNarrower_rad;
+  all.both_are_narrow = one.is_narrow() && other.is_narrow();
   all.inlier_share =
       agreement.in_sight_ratio / (view.typical.in_sight_ratio * (all.sensors_differ ? Differing::kShare : 1.0));
   all.hidden_share = agreement.hidden_share;
