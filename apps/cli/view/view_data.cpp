@@ -204,6 +204,13 @@ Json answers_of(const ViewData& data, const Reference& reference) {
 }  // namespace
 
 Result<ViewData> read_map_view(const fs::path& map_file) {
+  ViewData data;
+  data.command = "slam";
+  const auto store = open_map(map_file);
+  if (!store) return store.error();
+  const auto places = store->places();
+  if (!places) return places.error();
+  if (places->empty()) return data;  // the run has just begun
   const auto map = SavedMap::open(map_file);
   if (!map) return map.error();
   const auto scans = map->store()->scans();
@@ -214,8 +221,6 @@ Result<ViewData> read_map_view(const fs::path& map_file) {
   if (!sessions) return sessions.error();
   if (!answers) return answers.error();
   if (!edges) return edges.error();
-  ViewData data;
-  data.command = "slam";
   for (const StoredSession& session : *sessions) data.sessions.push_back(session.recording);
   if (!sessions->empty()) data.input = sessions->back().recording;
   std::set<FrameId> keyframes;                          // another program may have added some since

@@ -35,7 +35,7 @@ struct ViewData {
   std::optional<double> north_deg;  ///< of a map made with GPS: from its y axis, counterclockwise
 };
 
-/// Of a map (its folder may hold more), or of what `detect` wrote.
+/// Of a map (its folder may hold more; one without key frames has no scans), or of what `detect` wrote.
 Result<ViewData> read_map_view(const std::filesystem::path& map_file);
 Result<ViewData> read_detect_view(const std::filesystem::path& folder);
 /// view.json (docs/formats.md); `folder` gives run.json and `evidence` is an evidence.csv, where they are.

@@ -42,6 +42,15 @@ export class Side {
   }
 }
 
+/** Whether the processor draws, for which smooth edges are most of the work. */
+function isDrawnInSoftware(): boolean {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const info = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = gl && info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
+}
+
 export class Stage {
   readonly renderer: THREE.WebGLRenderer;
   readonly perspective = new THREE.PerspectiveCamera(50, 1, 0.5, 20000);
@@ -56,7 +65,7 @@ export class Stage {
   private height = 0;
 
   constructor(readonly canvas: HTMLCanvasElement) {
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !isDrawnInSoftware() });
     this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
     THREE.ColorManagement.enabled = true;
     this.orthographic.userData.half = 50;

@@ -6,9 +6,12 @@ import { connect } from "node:net";
 import { join } from "node:path";
 import { after, test } from "node:test";
 import validator from "gltf-validator";
-import { revisit, serve, slam, work } from "./server.mjs";
+import { revisit, serve, slam, start, stopAll, work } from "./server.mjs";
 
-after(() => rmSync(work, { recursive: true, force: true }));
+after(() => {
+  stopAll();
+  rmSync(work, { recursive: true, force: true });
+});
 const { drive, out } = slam("loop");
 revisit("evaluate", out, "--reference", drive);
 
@@ -146,6 +149,17 @@ test("what poses a recording came with is no truth, and a new run forgets the ol
   revisit("slam", other.drive, "--out", again.out, "--overwrite", "--no-map");
   const now = await (await fetch(`${await serve(context, again.out)}a/view.json`)).json();
   assert.equal(now.has_truth, false);
+});
+
+test("a run that has just begun is shown, as one without scans", async () => {
+  const { address, child } = await start("slam", drive, "--out", join(work, "begun"), "--view");
+  for (let scans = 0; scans === 0;) {
+    const answer = await fetch(`${address}a/view.json`), said = await answer.text();
+    assert.equal(answer.status, 200, said);
+    scans = JSON.parse(said).scans.frame.length;
+  }
+  child.kill("SIGINT");
+  await new Promise((resolve) => child.on("exit", resolve));
 });
 
 test("many pages that listen leave room for others", async (context) => {
