@@ -7,12 +7,12 @@
 #include <vector>
 
 #include <oneapi/tbb/global_control.h>
-#include <pcl/point_types.h>
-#include <pcl/registration/icp.h>
 
 #include <revisit/registration/icp.hpp>
 #include <revisit/registration/surface_cloud.hpp>
 #include <revisit/simulation/simulated_recording.hpp>
+
+#include "oracles/pcl_icp.hpp"
 
 namespace {
 
@@ -81,32 +81,13 @@ void align(benchmark::State& state) {
 }
 
 void pcl_align(benchmark::State& state) {
-  using Cloud = pcl::PointCloud<pcl::PointNormal>;
-  const auto convert = [](const SurfaceCloud& from) {
-    Cloud::Ptr to(new Cloud);
-    for (std::size_t i = 0; i < from.size(); ++i) {
-      if (from.normal(i).squaredNorm() < 0.5f) continue;
-      pcl::PointNormal p;
-      p.getVector3fMap() = from.point(i);
-      p.getNormalVector3fMap() = from.normal(i);
-      to->push_back(p);
-    }
-    return to;
-  };
   std::size_t next = 0;
   double worst_m = 0.0;
   for (auto _ : state) {
     const Pair& pair = pairs()[next++ % pairs().size()];
-    pcl::IterativeClosestPointWithNormals<pcl::PointNormal, pcl::PointNormal> icp;
-    icp.setInputTarget(convert(pair.target));
-    icp.setInputSource(convert(pair.source));
-    icp.setMaxCorrespondenceDistance(2.0);
-    icp.setMaximumIterations(60);
-    Cloud unused;
-    Eigen::Matrix4f guess = Eigen::Matrix4f::Identity();
-    guess.topLeftCorner<3, 3>() = pair.T_target_source.linear().cast<float>();
-    icp.align(unused, guess);
-    const Pose T(icp.getFinalTransformation().cast<double>());
+    Pose T_guess = Pose::Identity();
+    T_guess.linear() = pair.T_target_source.linear();
+    const Pose T = oracles::pcl_point_to_plane(pair.target, pair.source, T_guess, 2.0, 60);
     worst_m = std::max(worst_m, (T.inverse() * pair.T_target_source).translation().norm());
   }
   state.counters["worst_m"] = worst_m;

@@ -36,7 +36,8 @@ Vectors errors_of(const PoseGraph& graph, const std::vector<const UpReading*>& r
   };
   std::vector<Weighed> all;
   all.reserve(readings.size());
-  for (const UpReading* reading : readings) all.push_back({graph.nodes()[reading->node].linear(), reading->up, {}});
+  for (const UpReading* reading : readings)
+    all.push_back({graph.nodes()[reading->node].linear(), reading->up, Eigen::Vector3d::Zero()});
   Eigen::Vector3d off = Eigen::Vector3d::Zero();
   for (int round = 0; round < Weighing::kRounds; ++round) {
     Eigen::Vector3d up = Eigen::Vector3d::Zero(), more_off = Eigen::Vector3d::Zero();

@@ -5,13 +5,10 @@
 
 #include <gtest/gtest.h>
 
-#include <pcl/point_types.h>
-#include <pcl/registration/gicp.h>
-#include <pcl/registration/icp.h>
-
 #include <revisit/registration/agreement.hpp>
 #include <revisit/registration/surface_cloud.hpp>
 
+#include "oracles/pcl_icp.hpp"
 #include "thin_scan.hpp"
 
 namespace revisit {
@@ -61,24 +58,7 @@ TEST(Icp, APriorTellsWhatSurfacesDoNot) {
 TEST(Icp, AgreesWithPclFromNearby) {
   const Pose T_a = SyntheticWorld::at(0, 0, 0), T_b = SyntheticWorld::at(0.3, 0.1, to_radians(1.0));
   const SurfaceCloud a(thin_scan(T_a)), b(thin_scan(T_b, 2));
-  pcl::PointCloud<pcl::PointNormal>::Ptr pa(new pcl::PointCloud<pcl::PointNormal>),
-      pb(new pcl::PointCloud<pcl::PointNormal>);
-  for (const auto& [cloud, target] : {std::pair{&a, pa}, {&b, pb}})
-    for (std::size_t i = 0; i < cloud->size(); ++i) {
-      if (cloud->normal(i).squaredNorm() < 0.5f) continue;
-      pcl::PointNormal p;
-      p.getVector3fMap() = cloud->point(i);
-      p.getNormalVector3fMap() = cloud->normal(i);
-      target->push_back(p);
-    }
-  pcl::IterativeClosestPointWithNormals<pcl::PointNormal, pcl::PointNormal> oracle;
-  oracle.setInputTarget(pa);
-  oracle.setInputSource(pb);
-  oracle.setMaxCorrespondenceDistance(0.5);
-  oracle.setMaximumIterations(50);
-  pcl::PointCloud<pcl::PointNormal> unused;
-  oracle.align(unused);
-  const Pose T_oracle(oracle.getFinalTransformation().cast<double>());
+  const Pose T_oracle = oracles::pcl_point_to_plane(a, b, Pose::Identity(), 0.5, 50);
   const Pose T = align_icp(a, b.points(), Pose::Identity(), {.coarse_m = 1.0}).T_target_source;
   EXPECT_LT(error_m(T, T_oracle), 0.05);
   EXPECT_LT(error_deg(T, T_oracle), 0.2);
@@ -87,16 +67,7 @@ TEST(Icp, AgreesWithPclFromNearby) {
 TEST(Icp, PlaneToPlaneAgreesWithPclsGeneralisedIcp) {
   const Pose T_a = SyntheticWorld::at(0, 0, 0), T_b = SyntheticWorld::at(0.3, 0.1, to_radians(1.0));
   const SurfaceCloud a(thin_scan(T_a)), b(thin_scan(T_b, 2));
-  pcl::PointCloud<pcl::PointXYZ>::Ptr pa(new pcl::PointCloud<pcl::PointXYZ>), pb(new pcl::PointCloud<pcl::PointXYZ>);
-  for (const auto& [cloud, target] : {std::pair{&a, pa}, {&b, pb}})
-    for (const auto& p : cloud->points()) target->push_back({p.x(), p.y(), p.z()});
-  pcl::GeneralizedIterativeClosestPoint<pcl::PointXYZ, pcl::PointXYZ> oracle;
-  oracle.setInputTarget(pa);
-  oracle.setInputSource(pb);
-  oracle.setMaxCorrespondenceDistance(1.0);
-  pcl::PointCloud<pcl::PointXYZ> unused;
-  oracle.align(unused);
-  const Pose T_oracle(oracle.getFinalTransformation().cast<double>()), T_truth = T_a.inverse() * T_b;
+  const Pose T_oracle = oracles::pcl_generalised_icp(a, b, 1.0), T_truth = T_a.inverse() * T_b;
   const Pose T =
       align_icp(a, b.points(), Pose::Identity(), {.coarse_m = 1.0, .source_normals = b.normals()}).T_target_source;
   EXPECT_LT(error_m(T, T_oracle), 0.05);

@@ -68,7 +68,9 @@ TEST(StoredClouds, InAFileWithWhatWasSeenBefore) {
   for (std::size_t i = 0; i < with.size(); ++i) {
     const auto cloud = *clouds->get({static_cast<std::int64_t>(i)});
     ASSERT_EQ(cloud->before != nullptr, with[i].before != nullptr) << "place " << i;
-    if (cloud->before) EXPECT_EQ(to_bytes(*cloud->before), to_bytes(stored.clouds[1])) << "place " << i;
+    if (cloud->before) {
+      EXPECT_EQ(to_bytes(*cloud->before), to_bytes(stored.clouds[1])) << "place " << i;
+    }
   }
 }
 

@@ -15,6 +15,7 @@
 #include <revisit/descriptors/internal/triangles.hpp>
 
 namespace revisit::descriptors_internal {
+namespace binary_triangle {
 namespace {
 
 constexpr std::size_t kKeypoints = 60;
@@ -96,7 +97,8 @@ class BinaryTriangle final : public TriangleMethod {
 };
 
 }  // namespace
+}  // namespace binary_triangle
 
-std::unique_ptr<Baseline> make_binary_triangle() { return std::make_unique<BinaryTriangle>(); }
+std::unique_ptr<Baseline> make_binary_triangle() { return std::make_unique<binary_triangle::BinaryTriangle>(); }
 
 }  // namespace revisit::descriptors_internal

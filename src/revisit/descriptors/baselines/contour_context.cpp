@@ -25,6 +25,7 @@
 #include <revisit/descriptors/internal/planar_mixture.hpp>
 
 namespace revisit::descriptors_internal {
+namespace contour_context {
 namespace {
 
 constexpr std::size_t kAnchorLevels = 3, kAnchors = 6, kNeighbours = 15, kOfMixture = 25, kPlacesCompared = 50;
@@ -241,7 +242,8 @@ class ContourContext final : public Baseline {
 };
 
 }  // namespace
+}  // namespace contour_context
 
-std::unique_ptr<Baseline> make_contour_context() { return std::make_unique<ContourContext>(); }
+std::unique_ptr<Baseline> make_contour_context() { return std::make_unique<contour_context::ContourContext>(); }
 
 }  // namespace revisit::descriptors_internal

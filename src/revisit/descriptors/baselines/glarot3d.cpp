@@ -14,6 +14,7 @@
 #include <revisit/descriptors/internal/baselines.hpp>
 
 namespace revisit::descriptors_internal {
+namespace glarot3d {
 namespace {
 
 constexpr int kCells = 100, kAround = 2, kKeypoints = 100, kLengths = 20, kFace = 4, kTurns = 4 * kFace;
@@ -115,7 +116,8 @@ class Glarot3d final : public Baseline {
 };
 
 }  // namespace
+}  // namespace glarot3d
 
-std::unique_ptr<Baseline> make_glarot3d() { return std::make_unique<Glarot3d>(); }
+std::unique_ptr<Baseline> make_glarot3d() { return std::make_unique<glarot3d::Glarot3d>(); }
 
 }  // namespace revisit::descriptors_internal

@@ -18,6 +18,7 @@
 #include <revisit/descriptors/internal/baselines.hpp>
 
 namespace revisit::descriptors_internal {
+namespace landmark_density {
 namespace {
 
 constexpr std::size_t kScans = 10, kPlaceEvery = 5, kLandmarks = 60;
@@ -149,7 +150,8 @@ class LandmarkDensity final : public Baseline {
 };
 
 }  // namespace
+}  // namespace landmark_density
 
-std::unique_ptr<Baseline> make_landmark_density() { return std::make_unique<LandmarkDensity>(); }
+std::unique_ptr<Baseline> make_landmark_density() { return std::make_unique<landmark_density::LandmarkDensity>(); }
 
 }  // namespace revisit::descriptors_internal

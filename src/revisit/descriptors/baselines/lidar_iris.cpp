@@ -18,6 +18,7 @@
 #include <revisit/descriptors/internal/circular_correlation.hpp>
 
 namespace revisit::descriptors_internal {
+namespace lidar_iris {
 namespace {
 
 constexpr int kRanges = 80, kAzimuths = 360, kHeights = 8, kScales = 4, kFrequencies = kAzimuths / 2 + 1;
@@ -122,7 +123,8 @@ class LidarIris final : public TurnMethod {
 };
 
 }  // namespace
+}  // namespace lidar_iris
 
-std::unique_ptr<Baseline> make_lidar_iris() { return std::make_unique<LidarIris>(); }
+std::unique_ptr<Baseline> make_lidar_iris() { return std::make_unique<lidar_iris::LidarIris>(); }
 
 }  // namespace revisit::descriptors_internal

@@ -14,6 +14,7 @@
 #include <revisit/descriptors/internal/baselines.hpp>
 
 namespace revisit::descriptors_internal {
+namespace m2dp {
 namespace {
 
 constexpr int kCircles = 8, kSectors = 16, kAzimuths = 4, kElevations = 16;
@@ -85,7 +86,8 @@ class M2dp final : public Baseline {
 };
 
 }  // namespace
+}  // namespace m2dp
 
-std::unique_ptr<Baseline> make_m2dp() { return std::make_unique<M2dp>(); }
+std::unique_ptr<Baseline> make_m2dp() { return std::make_unique<m2dp::M2dp>(); }
 
 }  // namespace revisit::descriptors_internal

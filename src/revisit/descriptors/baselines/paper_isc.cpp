@@ -11,6 +11,7 @@
 #include <revisit/descriptors/similarity.hpp>
 
 namespace revisit::descriptors_internal {
+namespace paper_isc {
 namespace {
 
 constexpr int kRings = 60, kSectors = 20;
@@ -69,7 +70,8 @@ class PaperIsc final : public Baseline {
 };
 
 }  // namespace
+}  // namespace paper_isc
 
-std::unique_ptr<Baseline> make_paper_isc() { return std::make_unique<PaperIsc>(); }
+std::unique_ptr<Baseline> make_paper_isc() { return std::make_unique<paper_isc::PaperIsc>(); }
 
 }  // namespace revisit::descriptors_internal

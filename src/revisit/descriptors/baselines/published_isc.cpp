@@ -14,6 +14,7 @@
 #include <revisit/descriptors/internal/baselines.hpp>
 
 namespace revisit::descriptors_internal {
+namespace published_isc {
 namespace {
 
 constexpr int kRings = 20, kSectors = 60;
@@ -75,7 +76,8 @@ class PublishedIsc final : public TurnMethod {
 };
 
 }  // namespace
+}  // namespace published_isc
 
-std::unique_ptr<Baseline> make_published_isc() { return std::make_unique<PublishedIsc>(); }
+std::unique_ptr<Baseline> make_published_isc() { return std::make_unique<published_isc::PublishedIsc>(); }
 
 }  // namespace revisit::descriptors_internal

@@ -18,6 +18,7 @@
 #include <revisit/descriptors/internal/overhead_features.hpp>
 
 namespace revisit::descriptors_internal {
+namespace ring {
 namespace {
 
 constexpr int kAngles = 120, kOffsets = 120, kFrequencies = kOffsets / 2;
@@ -131,8 +132,9 @@ class Ring final : public Baseline {
 };
 
 }  // namespace
+}  // namespace ring
 
-std::unique_ptr<Baseline> make_ring() { return std::make_unique<Ring>(false); }
-std::unique_ptr<Baseline> make_ring_pp() { return std::make_unique<Ring>(true); }
+std::unique_ptr<Baseline> make_ring() { return std::make_unique<ring::Ring>(false); }
+std::unique_ptr<Baseline> make_ring_pp() { return std::make_unique<ring::Ring>(true); }
 
 }  // namespace revisit::descriptors_internal

@@ -12,6 +12,7 @@
 #include <revisit/descriptors/internal/polar_heights.hpp>
 
 namespace revisit::descriptors_internal {
+namespace scan_context_pp {
 namespace {
 
 constexpr float kLane_m = 2.f;
@@ -87,7 +88,8 @@ class ScanContextPlusPlus final : public TurnMethod {
 };
 
 }  // namespace
+}  // namespace scan_context_pp
 
-std::unique_ptr<Baseline> make_scan_context_pp() { return std::make_unique<ScanContextPlusPlus>(); }
+std::unique_ptr<Baseline> make_scan_context_pp() { return std::make_unique<scan_context_pp::ScanContextPlusPlus>(); }
 
 }  // namespace revisit::descriptors_internal

@@ -13,6 +13,7 @@
 #include <revisit/descriptors/internal/baselines.hpp>
 
 namespace revisit::descriptors_internal {
+namespace solid {
 namespace {
 
 constexpr int kRanges = 40, kElevations = 32, kAzimuths = 60;
@@ -86,7 +87,8 @@ class Solid final : public Baseline {
 };
 
 }  // namespace
+}  // namespace solid
 
-std::unique_ptr<Baseline> make_solid() { return std::make_unique<Solid>(); }
+std::unique_ptr<Baseline> make_solid() { return std::make_unique<solid::Solid>(); }
 
 }  // namespace revisit::descriptors_internal

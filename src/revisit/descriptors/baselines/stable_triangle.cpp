@@ -16,6 +16,7 @@
 #include <revisit/descriptors/internal/triangles.hpp>
 
 namespace revisit::descriptors_internal {
+namespace stable_triangle {
 namespace {
 
 constexpr std::size_t kKeypoints = 100;
@@ -108,7 +109,8 @@ class StableTriangle final : public TriangleMethod {
 };
 
 }  // namespace
+}  // namespace stable_triangle
 
-std::unique_ptr<Baseline> make_stable_triangle() { return std::make_unique<StableTriangle>(); }
+std::unique_ptr<Baseline> make_stable_triangle() { return std::make_unique<stable_triangle::StableTriangle>(); }
 
 }  // namespace revisit::descriptors_internal

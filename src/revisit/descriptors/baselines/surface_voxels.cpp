@@ -11,11 +11,11 @@
 namespace revisit::descriptors_internal {
 namespace {
 
-constexpr std::size_t kFewestPoints = 10;
+constexpr std::size_t kFewestInAVoxel = 10;
 constexpr float kFarthest_m = 100.f;  // cells are counted from there
 
 Eigen::Vector3f flat_normal(const std::vector<Eigen::Vector3f>& points, const Eigen::Vector3f& centre, float flat_m2) {
-  if (points.size() < kFewestPoints) return Eigen::Vector3f::Zero();
+  if (points.size() < kFewestInAVoxel) return Eigen::Vector3f::Zero();
   Eigen::Matrix3f covariance = Eigen::Matrix3f::Zero();
   for (const Eigen::Vector3f& point : points) covariance += (point - centre) * (point - centre).transpose();
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
