@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A slam that is killed (kill -9) at random moments, and resumed each time, writes the same bytes as one that never was.
 
-usage: tests/resume_test.py PROGRAM [--power LIBRARY] [--kills N] [--seed N]
+usage: tests/resume_test.py PROGRAM [--power LIBRARY] [--kills N] [--frames N] [--seed N]
 Of each way to run it: as it is, with wheels and GPS, and as a second session of a map. What differs by its nature is left out:
 times (run.json), and the pages of map.revisit, whose tables are compared row by row. With the library of faults/lose_power.cpp the
 power fails, too, and so it does while `merge` and `export` write: writes that were not synced are lost or not, each by itself. The files
@@ -181,6 +181,7 @@ def main():
     parser.add_argument("program", type=pathlib.Path)
     parser.add_argument("--power", type=pathlib.Path, help="the library of faults/lose_power.cpp")
     parser.add_argument("--kills", type=int, default=12, help="of each way to run it [%(default)s]")
+    parser.add_argument("--frames", type=int, default=120, help="of a drive of 60 m [%(default)s]")
     parser.add_argument("--seed", type=int, default=None, help="of the moments; without, another one each time")
     options = parser.parse_args()
     PROGRAM = options.program.resolve()
@@ -190,7 +191,7 @@ def main():
     folder = pathlib.Path(tempfile.mkdtemp())
     days = [folder / f"day{day}.mcap" for day in (0, 1)]
     for day, bag in enumerate(days):
-        command(["simulate", "--sensor", "vlp16", "--length_m", 60, "--frames", 120, "--day", day, "--gps", "true", "--imu", "true",
+        command(["simulate", "--sensor", "vlp16", "--length_m", 60, "--frames", options.frames, "--day", day, "--gps", "true", "--imu", "true",
                  "--out", bag], folder)
     for name, arguments_of in {
         "LiDAR alone": lambda out: with_options(slam(days[0], out), "--wheels", "none", "--no-imu"),

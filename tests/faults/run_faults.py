@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lets every write, sync, rename, opening of a file and allocation of the program fail, one after the other.
 
-usage: tests/faults/run_faults.py PROGRAM SHIM [--most N] [--work FOLDER]
+usage: tests/faults/run_faults.py PROGRAM SHIM [--most N] [--frames N] [--work FOLDER]
 
 PROGRAM: revisit; SHIM: the library of fail_call.cpp. --most: of each kind of call so many, spread evenly (default: every
 one). After each the program must have ended by itself, with an error that says what was wrong; what lies on the disk is
@@ -32,10 +32,10 @@ def run(program, arguments, environment=None):
 
 
 class Faults:
-    def __init__(self, program, shim, work):
+    def __init__(self, program, shim, work, frames):
         self.program, self.shim, self.work = program, shim, work
         for day in (0, 1):
-            self.must("simulate", "--sensor", "vlp16", "--length_m", 20, "--frames", 30, "--day", day, "--out", work / f"day{day}")
+            self.must("simulate", "--sensor", "vlp16", "--length_m", 20, "--frames", frames, "--day", day, "--out", work / f"day{day}")
             self.must("slam", work / f"day{day}", "--no-map", "--out", work / f"map{day}")
         map0, map1, drive = work / "map0" / "map.revisit", work / "map1" / "map.revisit", work / "day1"
         self.commands = {
@@ -145,12 +145,13 @@ def main():
     parser.add_argument("program", type=pathlib.Path)
     parser.add_argument("shim", type=pathlib.Path)
     parser.add_argument("--most", type=int, default=0)
+    parser.add_argument("--frames", type=int, default=30, help="of a drive of 20 m [%(default)s]")
     parser.add_argument("--kinds", nargs="*", default=KINDS)
     parser.add_argument("--commands", nargs="*")
     parser.add_argument("--work", type=pathlib.Path)
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
-        faults = Faults(given.program.resolve(), given.shim.resolve(), (given.work or pathlib.Path(temporary)).resolve())
+        faults = Faults(given.program.resolve(), given.shim.resolve(), (given.work or pathlib.Path(temporary)).resolve(), given.frames)
         print("| command | call | calls | tried | ended with an error | aborted | went on | wrong |\n|---|---|---|---|---|---|---|---|")
         wrong = []
         for command in given.commands or faults.commands:
