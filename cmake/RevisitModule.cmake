@@ -31,7 +31,7 @@ function(revisit_test name)
   set_target_properties(${name} PROPERTIES UNITY_BUILD ON)  # GoogleTest and Eigen, read once
   target_link_libraries(${name} PRIVATE ${T_LIBRARIES} revisit_flags revisit_source_dir GTest::gtest GTest::gtest_main)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
-  # What takes long in tests is in the library: optimised less, they compile in two thirds of the time.
+  # What takes long in tests is in the library: with -O1 they compile in two thirds of the time.
   target_compile_options(${name} PRIVATE $<$<AND:$<CXX_COMPILER_ID:GNU,Clang>,$<CONFIG:Release>>:-O1>)
   set(longest_s 120)
   if(REVISIT_SANITIZE)

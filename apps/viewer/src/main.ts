@@ -98,7 +98,8 @@ function start(views: View[]) {
   };
   const noTiles = view.command === "detect" ? "No points: revisit slam makes a map." : "The map so far, thinned; all points come with the finished map.";
   if (!view.has_tiles) say(noTiles);
-  if (view.scans.frame.length === 0) say("No trajectory: these results have no poses. The charts show which scans met.");
+  if (view.scans.frame.length === 0)
+    say(view.command === "detect" ? "No trajectory: these results have no poses. The charts show which scans met." : "No scan yet: the run has just begun.");
 
   let pressed: [number, number] = [0, 0], measured: Triple | null = null;
   canvas.addEventListener("pointerdown", (event) => (pressed = [event.offsetX, event.offsetY]));

@@ -42,7 +42,7 @@ export class Side {
   }
 }
 
-/** Whether the processor draws, for which smooth edges are most of the work. */
+/** Whether the processor draws, and no graphics card: smoothed edges then cost much. */
 function isDrawnInSoftware(): boolean {
   const gl = document.createElement("canvas").getContext("webgl2");
   const info = gl?.getExtension("WEBGL_debug_renderer_info");
