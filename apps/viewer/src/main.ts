@@ -153,10 +153,10 @@ function listen(stage: Stage, say: (text: string) => void, update: (view: View) 
     try {
       for (const side of stage.sides) {
         const name = side.view.name, view = toView(name, await readJson(`${name}/view.json`));
-        if (view.has_tiles !== side.view.has_tiles) return location.reload();
-        const isFirst = side.view.scans.frame.length === 0;
+        const isFirst = side.view.scans.frame.length === 0 && view.scans.frame.length > 0;
+        if (isFirst || view.has_tiles !== side.view.has_tiles) return location.reload();  // what can be shown has changed
         side.update(view);
-        if (!stage.isMoved) stage.frame(isFirst || stage.camera === stage.orthographic);  // all of it, while nobody looks elsewhere
+        if (!stage.isMoved) stage.frame(stage.camera === stage.orthographic);  // all of it, while nobody looks elsewhere
       }
       update(stage.sides[0]!.view);
       stage.draw();
