@@ -13,9 +13,9 @@ TrackState driving(int scans = 20) {
     ScanMatch match;
     match.T_previous_lidar = planar_pose(i > 0 ? 1.0 : 0.0, 0.0, 0.0);
     match.T_odom_lidar = track.T_odom_lidar * match.T_previous_lidar;
-    match.position_information = 1e6 * Eigen::Matrix3d::Identity();
-    match.matched = 0.8;
-    match.matched_sideways = 0.4;
+    match.icp.position_information = 1e6 * Eigen::Matrix3d::Identity();
+    match.icp.matched = 0.8;
+    match.icp.matched_sideways = 0.4;
     match.is_tracked = true;
     track.advance(0.1 * i, {}, match);
   }

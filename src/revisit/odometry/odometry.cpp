@@ -100,23 +100,28 @@ OdometryStep Odometry::match(const Scan& scan, double stamp_s, const std::option
     guess = MotionGuess{*T_turned, Measured::kTurn};
   MatcherScan thinned = matcher_.thinned(step.compensated.empty() ? scan.points : step.compensated);
   thinned.is_stamp_assumed = scan.is_stamp_assumed || scan.stamp_s < stamp_s;
-  ScanMatch match;
   // Before a scan is looked for elsewhere, its sweep is compensated again with the motion that was found, and matched
   // from there: that match measures how far it slides from where it was found first, not from the prediction.
-  for (const SearchExtent extent : {SearchExtent::kThere, SearchExtent::kAround}) {
-    match = matcher_.match(stamp_s, thinned, guess, extent);
+  ScanMatch match = matcher_.match(stamp_s, thinned, guess);
+  for (const bool is_around : {false, true}) {
+    if (is_around) match = matcher_.look_around(stamp_s, thinned, match);
     if (is_swept && match.prediction_error_m > Following::kWrong_m) {
       const Twist found = with_imu(matcher_.motion_found(match.T_previous_found, stamp_s));
       std::vector<Point> again = compensated(scan, found);
-      if (first_scan_) begin_map_again(found);
+      const bool has_new_map = first_scan_.has_value();
+      if (has_new_map) begin_map_again(found);
       MatcherScan thinned_again = matcher_.thinned(again);
       thinned_again.is_stamp_assumed = thinned.is_stamp_assumed;
-      const ScanMatch matched_again = matcher_.match_again(stamp_s, thinned_again, match, extent);
+      ScanMatch matched_again = matcher_.match_again(stamp_s, thinned_again, match);
+      if (is_around && !matched_again.is_tracked)
+        matched_again = matcher_.look_around(stamp_s, thinned_again, matched_again);
       if (matched_again.is_tracked) {
         match = matched_again;
         step.motion = found;
         step.compensated = std::move(again);
         thinned = std::move(thinned_again);
+      } else if (has_new_map) {
+        match = matcher_.match(stamp_s, thinned, guess);
       }
     }
     if (match.is_tracked) break;

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include <revisit/core/pose.hpp>
+#include <revisit/registration/icp.hpp>
 
 namespace revisit {
 
@@ -27,24 +28,19 @@ struct MotionGuess {
   Measured measured = Measured::kAll;
 };
 
-/// Where a scan is looked for: where it is predicted, or elsewhere, too, if it does not fit there.
-enum class SearchExtent : std::uint8_t { kThere, kAround };
-
 /// Where one scan was matched.
 struct ScanMatch {
   Pose T_odom_lidar = Pose::Identity();          ///< at the scan's stamp; the first scan is the origin
   Pose T_previous_lidar = Pose::Identity();      ///< motion since the scan before
   Pose T_previous_found = Pose::Identity();      ///< the same as registration has it, believed or not
-  Pose T_previous_predicted = Pose::Identity();  ///< and as it was expected
+  Pose T_previous_predicted = Pose::Identity();  ///< as it was expected
+  Pose T_previous_start = Pose::Identity();      ///< and where registration began
   Matrix6 information = Matrix6::Zero();         ///< of T_previous_lidar, as in LoopConstraint
-  Eigen::Matrix3d position_information = Eigen::Matrix3d::Zero();  ///< as in IcpResult
-  double matched = 0.0;                                            ///< share of the points on a surface of the map
-  double matched_sideways = 0.0;     ///< the same of what stands upright alone (IcpResult)
-  double met = 0.0;                  ///< share with a surface of the map nearby at all
-  double prediction_error_m = 0.0;   ///< of a point at the median range
-  std::optional<double> measured_m;  ///< what wheels say the sensor moved
-  bool is_turn_measured = false;     ///< an IMU says how T_previous_predicted is turned
-  bool is_tracked = false;           ///< otherwise the pose is the predicted one
+  IcpResult icp;                                 ///< of the scan with the map, believed or not
+  double prediction_error_m = 0.0;               ///< of a point at the median range
+  std::optional<double> measured_m;              ///< what wheels say the sensor moved
+  bool is_turn_measured = false;                 ///< an IMU says how T_previous_predicted is turned
+  bool is_tracked = false;                       ///< otherwise the pose is the predicted one
 };
 
 }  // namespace revisit

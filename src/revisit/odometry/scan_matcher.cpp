@@ -93,53 +93,56 @@ double ScanMatcher::search_width_m() const {
   return std::clamp(kSigmas * std::sqrt(track_.squared_prediction_error_m2), map_->voxel_m(), kWidestSearch_m);
 }
 
-ScanMatch ScanMatcher::match(double stamp_s, const MatcherScan& scan, const std::optional<MotionGuess>& guess,
-                             SearchExtent extent) const {
+ScanMatch ScanMatcher::match(double stamp_s, const MatcherScan& scan, const std::optional<MotionGuess>& guess) const {
   using Measured = MotionGuess::Measured;
   const double gap_s = stamp_s - track_.last_stamp_s;
-  ScanMatch predicted;
+  ScanMatch expected;
   if (guess) {
-    predicted.T_previous_predicted = guess->T_previous_lidar;
-    if (guess->measured == Measured::kAll) predicted.measured_m = guess->T_previous_lidar.translation().norm();
+    expected.T_previous_predicted = guess->T_previous_lidar;
+    if (guess->measured == Measured::kAll) expected.measured_m = guess->T_previous_lidar.translation().norm();
     // A sensor of rings was followed less well with it (docs/slam.md).
-    predicted.is_turn_measured = guess->measured == Measured::kTurn && track_.rings == 0;
+    expected.is_turn_measured = guess->measured == Measured::kTurn && track_.rings == 0;
   } else if (track_.motion && gap_s > 0.0 && gap_s <= TrackState::kLongestExtrapolation_s) {
-    predicted.T_previous_predicted = motion_after(*track_.motion, gap_s);
+    expected.T_previous_predicted = motion_after(*track_.motion, gap_s);
   }
-  return match_from(predicted.T_previous_predicted, map_ ? search_width_m() : 0.0, stamp_s, scan, predicted, extent);
+  expected.T_previous_start = expected.T_previous_predicted;
+  return match_from(map_ ? search_width_m() : 0.0, stamp_s, scan, expected);
 }
 
-ScanMatch ScanMatcher::match_again(double stamp_s, const MatcherScan& scan, const ScanMatch& match,
-                                   SearchExtent extent) const {
-  return match_from(match.T_previous_found, map_ ? fine_width_m(*map_) : 0.0, stamp_s, scan, match, extent);
+ScanMatch ScanMatcher::match_again(double stamp_s, const MatcherScan& scan, const ScanMatch& match) const {
+  ScanMatch expected = match;
+  expected.T_previous_start = match.T_previous_found;
+  return match_from(map_ ? fine_width_m(*map_) : 0.0, stamp_s, scan, expected);
 }
 
-ScanMatch ScanMatcher::match_from(const Pose& T_previous_start, double width_m, double stamp_s, const MatcherScan& scan,
-                                  const ScanMatch& predicted, SearchExtent extent) const {
-  ScanMatch match;
-  match.measured_m = predicted.measured_m;
-  match.is_turn_measured = predicted.is_turn_measured;
-  match.T_previous_predicted = predicted.T_previous_predicted;
-  match.T_previous_lidar = match.T_previous_found = T_previous_start;
-  match.T_odom_lidar = normalised(track_.T_odom_lidar * T_previous_start);
-  match.is_tracked = true;  // the map begins wherever it is
-  if (!map_) return match;
+ScanMatch ScanMatcher::look_around(double stamp_s, const MatcherScan& scan, const ScanMatch& match) const {
   wait();
-  const auto [icp, is_tracked] =
-      ScanSearch(*map_, track_, scan, stamp_s, predicted, T_previous_start).find(width_m, extent);
-  match.matched = icp.matched;
-  match.matched_sideways = icp.matched_sideways;
-  match.met = icp.met;
+  const auto [icp, is_tracked] = ScanSearch(*map_, track_, scan, stamp_s, match).around(match.icp);
+  return match_at(icp, is_tracked, match);
+}
+
+ScanMatch ScanMatcher::match_from(double width_m, double stamp_s, const MatcherScan& scan,
+                                  const ScanMatch& expected) const {
+  if (!map_) {
+    IcpResult at_start;
+    at_start.T_target_source = track_.T_odom_lidar * expected.T_previous_start;
+    return match_at(at_start, true, expected);  // the map begins wherever it is
+  }
+  wait();
+  const auto [icp, is_tracked] = ScanSearch(*map_, track_, scan, stamp_s, expected).near_start(width_m);
+  return match_at(icp, is_tracked, expected);
+}
+
+ScanMatch ScanMatcher::match_at(const IcpResult& icp, bool is_tracked, const ScanMatch& expected) const {
+  ScanMatch match = expected;
+  match.icp = icp;
   match.is_tracked = is_tracked;
   match.T_previous_found = track_.T_odom_lidar.inverse() * icp.T_target_source;
-  const Pose error = T_previous_start.inverse() * match.T_previous_found;
+  match.T_previous_lidar = is_tracked ? match.T_previous_found : match.T_previous_start;
+  match.T_odom_lidar = normalised(track_.T_odom_lidar * match.T_previous_lidar);
+  match.information = is_tracked ? icp.information : Matrix6::Zero();
+  const Pose error = match.T_previous_start.inverse() * match.T_previous_found;
   match.prediction_error_m = error.translation().norm() + rotation_angle(error) * track_.range_m;
-  if (match.is_tracked) {
-    match.T_odom_lidar = normalised(icp.T_target_source);
-    match.T_previous_lidar = match.T_previous_found;
-    match.information = icp.information;
-    match.position_information = icp.position_information;
-  }
   return match;
 }
 

@@ -39,12 +39,12 @@ class ScanMatcher {
 
   /// Thins a scan (filtered by range, its sweep compensated).
   MatcherScan thinned(std::span<const Point> points) const;
-  /// Matches the scan with the map, which begins with the first one.
-  ScanMatch match(double stamp_s, const MatcherScan& scan, const std::optional<MotionGuess>& guess = {},
-                  SearchExtent extent = SearchExtent::kAround) const;
+  /// Matches the scan with the map, which begins with the first one: near where it is predicted.
+  ScanMatch match(double stamp_s, const MatcherScan& scan, const std::optional<MotionGuess>& guess = {}) const;
   /// Matches a scan that was found at `match` once more, after its sweep was compensated with the motion found there.
-  ScanMatch match_again(double stamp_s, const MatcherScan& scan, const ScanMatch& match,
-                        SearchExtent extent = SearchExtent::kAround) const;
+  ScanMatch match_again(double stamp_s, const MatcherScan& scan, const ScanMatch& match) const;
+  /// Looks elsewhere, too, for a scan of which one of these gave `match`, not tracked.
+  ScanMatch look_around(double stamp_s, const MatcherScan& scan, const ScanMatch& match) const;
   /// Goes on from there: the scan enters the map, in the background.
   void accept(double stamp_s, const MatcherScan& scan, const ScanMatch& match);
 
@@ -65,9 +65,9 @@ class ScanMatcher {
  private:
   class Insertion;
   void wait() const;
-  // Of `predicted` only the prediction is read, and what of it was measured.
-  ScanMatch match_from(const Pose& T_previous_start, double width_m, double stamp_s, const MatcherScan& scan,
-                       const ScanMatch& predicted, SearchExtent extent) const;
+  // `expected` tells the prediction, what of it was measured, and where to begin.
+  ScanMatch match_from(double width_m, double stamp_s, const MatcherScan& scan, const ScanMatch& expected) const;
+  ScanMatch match_at(const IcpResult& icp, bool is_tracked, const ScanMatch& expected) const;
   // How far from the prediction a scan is looked for: the better motion is predicted, the less.
   double search_width_m() const;
 

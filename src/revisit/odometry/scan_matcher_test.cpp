@@ -25,14 +25,20 @@ std::vector<Point> seen_from(unsigned world, const Pose& T_world_lidar, unsigned
   return (world == 31 ? here : elsewhere).scan(T_world_lidar, {32, 600, -24.8, 5.0}, noise).points;
 }
 
+ScanMatch match(const ScanMatcher& matcher, double stamp_s, const MatcherScan& scan,
+                const std::optional<MotionGuess>& guess = {}) {
+  const ScanMatch there = matcher.match(stamp_s, scan, guess);
+  return there.is_tracked ? there : matcher.look_around(stamp_s, scan, there);
+}
+
 ScanMatch track(ScanMatcher& matcher, double stamp_s, std::span<const Point> points,
                 const std::optional<Pose>& T_previous_lidar = {}) {
   const MatcherScan scan = matcher.thinned(points);
   std::optional<MotionGuess> guess;
   if (T_previous_lidar) guess = MotionGuess{*T_previous_lidar};
-  const ScanMatch match = matcher.match(stamp_s, scan, guess);
-  matcher.accept(stamp_s, scan, match);
-  return match;
+  const ScanMatch found = match(matcher, stamp_s, scan, guess);
+  matcher.accept(stamp_s, scan, found);
+  return found;
 }
 
 TEST(ScanMatcher, FollowsABend) {
@@ -40,7 +46,7 @@ TEST(ScanMatcher, FollowsABend) {
   Pose T_found = Pose::Identity();
   for (int i = 0; i < 30; ++i) {
     const ScanMatch step = track(matcher, 0.1 * i, seen_from(31, pose_of(i), static_cast<unsigned>(i)));
-    EXPECT_TRUE(step.is_tracked) << "scan " << i << ", matched " << step.matched;
+    EXPECT_TRUE(step.is_tracked) << "scan " << i << ", matched " << step.icp.matched;
     T_found = step.T_odom_lidar;
   }
   const Pose error = (pose_of(0).inverse() * pose_of(29)).inverse() * T_found;
@@ -77,11 +83,11 @@ TEST(ScanMatcher, SaysWhenItDoesNotMatchAndKeepsTheMotionOfTheWheels) {
   for (int i = 0; i < 12; ++i) track(matcher, 0.1 * i, seen_from(31, pose_of(i), static_cast<unsigned>(i)));
   // Somewhere else all at once, and then nothing to be seen at all.
   const Pose T_wheels = planar_pose(0.6, 0.0, 0.02);
-  const double typical = matcher.match(1.2, matcher.thinned(seen_from(31, pose_of(12), 12))).matched;
+  const double typical = matcher.match(1.2, matcher.thinned(seen_from(31, pose_of(12), 12))).icp.matched;
   const ScanMatch lost = track(matcher, 1.2, seen_from(77, SyntheticWorld::at(40, 30, 2.0), 1), T_wheels);
   const ScanMatch blind = track(matcher, 1.3, {}, T_wheels);
   for (const ScanMatch& step : {lost, blind}) {
-    EXPECT_FALSE(step.is_tracked) << step.matched << " of " << typical;
+    EXPECT_FALSE(step.is_tracked) << step.icp.matched << " of " << typical;
     EXPECT_TRUE(step.T_previous_lidar.isApprox(T_wheels));
   }
 }
@@ -94,7 +100,7 @@ TEST(ScanMatcher, AfterAWideTurnUnseenItIsFoundAgain) {
   for (int i = 0; i < 12; ++i) track(matcher, 0.1 * i, seen_from(31, pose_of(i), static_cast<unsigned>(i)));
   for (int i = 12; i < 15; ++i) track(matcher, 0.1 * i, {});
   const ScanMatch found = track(matcher, 1.5, seen_from(31, turned(15, 75.0), 15));
-  ASSERT_TRUE(found.is_tracked) << found.matched;
+  ASSERT_TRUE(found.is_tracked) << found.icp.matched;
   const Pose error = (pose_of(0).inverse() * turned(15, 75.0)).inverse() * found.T_odom_lidar;
   EXPECT_LT(error.translation().norm(), 0.2);
   EXPECT_LT(to_degrees(rotation_angle(error)), 1.0);
@@ -138,8 +144,8 @@ TEST(ScanMatcher, TheGroundAloneIsNoMatch) {
   const std::size_t all = points.size();
   std::erase_if(points, [](const Point& p) { return p.z > -1.6f; });
   ASSERT_GT(points.size(), all / 2) << "most of it is ground";
-  const ScanMatch step = matcher.match(0.8, matcher.thinned(points));
-  EXPECT_GT(step.matched, 0.5);
+  const ScanMatch step = match(matcher, 0.8, matcher.thinned(points));
+  EXPECT_GT(step.icp.matched, 0.5);
   EXPECT_FALSE(step.is_tracked);
 }
 
@@ -198,8 +204,8 @@ HeadingErrors heading_errors(double imu_says) {
     const MatcherScan scan = matcher.thinned(
         i < kInTheStreet ? street.scan(SyntheticWorld::at(0.0, 0.0, yaw_rad), {16, 300, -24.8, 5.0}, seed).points
                          : seen_in_a_round_hall(yaw_rad, seed));
-    const ScanMatch step = matcher.match(
-        0.1 * i, scan, MotionGuess{planar_pose(0.0, 0.0, imu_says * turn_rad), MotionGuess::Measured::kTurn});
+    const ScanMatch step = match(matcher, 0.1 * i, scan,
+                                 MotionGuess{planar_pose(0.0, 0.0, imu_says * turn_rad), MotionGuess::Measured::kTurn});
     matcher.accept(0.1 * i, scan, step);
     if (i == 0 || i == kInTheStreet) continue;
     double& sum = i < kInTheStreet ? squares.in_the_street_deg : squares.in_the_hall_deg;
@@ -240,7 +246,7 @@ TEST(ScanMatcher, FollowsANarrowSensorThatTurns) {
     std::vector<Point> points = seen_from(31, pose(i), static_cast<unsigned>(i));
     std::erase_if(points, [](const Point& p) { return std::atan2(std::abs(p.y), p.x) > to_radians(35.0); });
     const ScanMatch step = track(matcher, 0.1 * i, points);
-    EXPECT_TRUE(step.is_tracked) << "scan " << i << ", matched " << step.matched << " of " << step.met;
+    EXPECT_TRUE(step.is_tracked) << "scan " << i << ", matched " << step.icp.matched << " of " << step.icp.met;
     T_found = step.T_odom_lidar;
   }
   const Pose error = (pose(0).inverse() * pose(23)).inverse() * T_found;

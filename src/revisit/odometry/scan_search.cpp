@@ -26,9 +26,10 @@ constexpr std::uint32_t kFewRings = 32;
 constexpr double kTurnsTried_deg[] = {0.0, 5.0, -5.0, 10.0, -10.0};  // where the prediction failed
 constexpr double kFastestTurn_degps = 300.0, kTurnStep_deg = 15.0;   // since the last scan that was tracked
 constexpr std::size_t kFewestToTurn = 300;                           // points: fewer fit at many headings
-constexpr std::size_t kFew = 1000;        // points of a scan, about, with which these are tried
-constexpr double kFixed_m = 0.04;         // a position that scans fix, a standard deviation
-constexpr double kStartInMotion_m = 1.0;  // tried on every side
+constexpr std::size_t kFew = 1000;          // points of a scan, about, with which these are tried
+constexpr std::size_t kSettlesWith = 2000;  // points of a scan, about, until all are registered
+constexpr double kFixed_m = 0.04;           // a position that scans fix, a standard deviation
+constexpr double kStartInMotion_m = 1.0;    // tried on every side
 // Another pose counts where so much more lies on what is upright; one with less than so much of what the last scan had
 // there is doubtful.
 constexpr double kBetter = 1.1, kDoubtful = 0.7;
@@ -47,24 +48,28 @@ bool fixes_position(const IcpResult& icp) {
 }  // namespace
 
 ScanSearch::ScanSearch(const LocalMap& map, const TrackState& track, const MatcherScan& scan, double stamp_s,
-                       const ScanMatch& predicted, const Pose& T_previous_start)
+                       const ScanMatch& expected)
     : map_(map),
       track_(track),
       scan_(scan),
-      T_previous_start_(T_previous_start),
-      is_moved_by_wheels_(predicted.measured_m.has_value()),
-      prior_(pose_prior(track, scan, stamp_s, predicted)),
-      judgement_(map, track, scan, stamp_s, predicted, T_previous_start) {}
+      T_previous_start_(expected.T_previous_start),
+      is_moved_by_wheels_(expected.measured_m.has_value()),
+      prior_(pose_prior(track, scan, stamp_s, expected)),
+      judgement_(map, track, scan, stamp_s, expected, T_previous_start_) {}
 
-ScanSearch::Found ScanSearch::find(double width_m, SearchExtent extent) {
+ScanSearch::Found ScanSearch::near_start(double width_m) {
   const double gap_s = judgement_.gap_s();
   const bool is_gap = gap_s > TrackState::kSparse_s && gap_s <= TrackState::kLongestExtrapolation_s;
   from_start(width_m);
   if (judgement_.is_turn_known() && prior_ && !fixes_position(best_)) without_prior();
   if (track_.scans == 1 && !is_moved_by_wheels_) beside_a_start_in_motion(width_m);
   if (is_gap && !is_moved_by_wheels_ && width_m > fine_width_m(map_)) after_a_gap();
-  if (extent == SearchExtent::kThere) return {best_, judgement_.fits(best_)};
-  // With an IMU that was right so far no turn is unforeseen.
+  return {best_, judgement_.fits(best_)};
+}
+
+// With an IMU that was right so far no turn is unforeseen.
+ScanSearch::Found ScanSearch::around(const IcpResult& found) {
+  best_ = found;
   if (!judgement_.is_turn_known()) turned_a_little();
   const IcpResult near = best_;
   if (!judgement_.is_turn_known()) turned_since_tracked();
@@ -73,20 +78,18 @@ ScanSearch::Found ScanSearch::find(double width_m, SearchExtent extent) {
 }
 
 void ScanSearch::from_start(double width_m) {
-  best_ = align(scan_.points, width_m, T_previous_start_, prior_);
-  if (!judgement_.is_possible(best_))
-    best_ = align(scan_.points, std::min(width_m, kNarrowSearch_m), T_previous_start_, prior_);
+  best_ = align(width_m, T_previous_start_, prior_);
+  if (!judgement_.is_possible(best_)) best_ = align(std::min(width_m, kNarrowSearch_m), T_previous_start_, prior_);
   // A push or a sudden turn back: without the prior, far more of what stands upright fits.
   if (prior_ && best_.matched_sideways < kDoubtful * track_.last_sideways)
-    take_if_more_upright(align(scan_.points, width_m, T_previous_start_), kDoubtful);
+    try_upright(kDoubtful, width_m, T_previous_start_);
 }
 
 // Where scans fix little, a wrong speed would lead past the right pose in scan after scan.
 void ScanSearch::without_prior() {
   Pose T_still = T_previous_start_;
   T_still.translation().setZero();
-  for (const Pose& T_from : {T_previous_start_, T_still})
-    take_if_more_upright(align(scan_.points, kFarSearch_m, T_from), kDoubtful);
+  for (const Pose& T_from : {T_previous_start_, T_still}) take_if_more_upright(kDoubtful, align(kFarSearch_m, T_from));
 }
 
 // The second scan of a drive that began in motion: what was seen once fits, to some degree, where the sensor stands.
@@ -95,7 +98,7 @@ void ScanSearch::beside_a_start_in_motion(double width_m) {
     const double angle_rad = to_radians(angle_deg);
     const Pose T_beside =
         planar_pose(kStartInMotion_m * std::cos(angle_rad), kStartInMotion_m * std::sin(angle_rad), 0.0);
-    take_if_more_upright(align(scan_.points, width_m, T_previous_start_ * T_beside), 1.0);
+    try_upright(1.0, width_m, T_previous_start_ * T_beside);
   }
 }
 
@@ -110,7 +113,7 @@ void ScanSearch::after_a_gap() {
       const IcpResult tried = align_few(kFarSearch_m, T_from);
       if (tried.matched_sideways <= most || !judgement_.is_possible(tried)) continue;
       most = kBetter * tried.matched_sideways;
-      best = align(scan_.points, fine_width_m(map_), from_previous(tried));
+      best = align(fine_width_m(map_), from_previous(tried));
     }
   };
   const StartsInAGap starts = track_.scans == 1
@@ -149,21 +152,37 @@ void ScanSearch::try_turned(const Pose& T_previous_lidar, double turn_deg) {
   const IcpResult tried = align_few(kFarSearch_m, T_previous_lidar * planar_pose(0.0, 0.0, to_radians(turn_deg)));
   if (tried.matched <= most_of_few_) return;
   most_of_few_ = tried.matched;
-  const IcpResult other = align(scan_.points, fine_width_m(map_), from_previous(tried));
+  const IcpResult other = align(fine_width_m(map_), from_previous(tried));
   if (judgement_.fits(other) || other.matched > best_.matched) best_ = other;
 }
 
-void ScanSearch::take_if_more_upright(const IcpResult& other, double share) {
-  if (share * other.matched_sideways > best_.matched_sideways && judgement_.is_possible(other)) best_ = other;
+// Of a scan of many points, a few of them first.
+void ScanSearch::try_upright(double share, double width_m, const Pose& T_previous_lidar) {
+  const bool has_many = scan_.points.size() >= 2 * kSettlesWith;
+  if (!has_many || is_more_upright(share, align_few(width_m, T_previous_lidar)))
+    take_if_more_upright(share, align(width_m, T_previous_lidar));
 }
 
-IcpResult ScanSearch::align(std::span<const Eigen::Vector3f> points, double width_m, const Pose& T_previous_lidar,
-                            const std::optional<PosePrior>& prior) const {
+void ScanSearch::take_if_more_upright(double share, const IcpResult& other) {
+  if (is_more_upright(share, other)) best_ = other;
+}
+
+bool ScanSearch::is_more_upright(double share, const IcpResult& other) const {
+  return share * other.matched_sideways > best_.matched_sideways && judgement_.is_possible(other);
+}
+
+IcpResult ScanSearch::align(double width_m, const Pose& T_previous_lidar, const std::optional<PosePrior>& prior) const {
+  return align_points(scan_.points, width_m, T_previous_lidar, prior);
+}
+
+IcpResult ScanSearch::align_points(std::span<const Eigen::Vector3f> points, double width_m,
+                                   const Pose& T_previous_lidar, const std::optional<PosePrior>& prior) const {
   IcpResult icp = align_icp(map_, points, track_.T_odom_lidar * T_previous_lidar,
                             {.coarse_m = width_m,
                              .fine_m = std::min(width_m, fine_width_m(map_)),
                              .least_reach_m = map_.voxel_m(),
                              .settled_m = kSettled_m,
+                             .settles_with = kSettlesWith,
                              .least_seen = kLeastSeen,
                              .level_deg = level_deg(track_.rings),
                              .noise_m = track_.rings > 0 ? kNoise_m : 0.0,
@@ -176,7 +195,7 @@ IcpResult ScanSearch::align_few(double width_m, const Pose& T_previous_lidar) {
   if (few_.empty())
     for (std::size_t i = 0; i < scan_.points.size(); i += 1 + scan_.points.size() / (2 * kFew))
       few_.push_back(scan_.points[i]);
-  return align(few_, width_m, T_previous_lidar);
+  return align_points(few_, width_m, T_previous_lidar, {});
 }
 
 }  // namespace revisit

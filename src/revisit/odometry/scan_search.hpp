@@ -16,16 +16,20 @@ namespace revisit {
 /// the number of threads that registration uses.
 class ScanSearch {
  public:
-  /// Begins at `T_previous_start`, a motion since the scan before: the predicted one, or one that was found already.
+  /// Of `expected` it reads the prediction, what of it was measured, and where registration begins: as predicted, or
+  /// where the scan was found already.
   ScanSearch(const LocalMap& map, const TrackState& track, const MatcherScan& scan, double stamp_s,
-             const ScanMatch& predicted, const Pose& T_previous_start);
+             const ScanMatch& expected);
 
   struct Found {
     IcpResult icp;  ///< the best of what was tried
     bool is_tracked = false;
   };
-  /// `width_m`: of registration's kernel at first, hence how far from the start it looks.
-  Found find(double width_m, SearchExtent extent);
+  /// Near the start, or where a drive that began in motion or a gap between scans may have led. `width_m`: of
+  /// registration's kernel at first, hence how far from each start it looks.
+  Found near_start(double width_m);
+  /// Elsewhere, after near_start() gave `found` and that does not fit: the sensor turned as nobody foresaw.
+  Found around(const IcpResult& found);
 
  private:
   // Each registers the scan from other starts and keeps in `best_` what fits better.
@@ -36,10 +40,14 @@ class ScanSearch {
   void turned_a_little();
   void turned_since_tracked();
 
-  IcpResult align(std::span<const Eigen::Vector3f> points, double width_m, const Pose& T_previous_lidar,
-                  const std::optional<PosePrior>& prior = {}) const;
+  IcpResult align(double width_m, const Pose& T_previous_lidar, const std::optional<PosePrior>& prior = {}) const;
   IcpResult align_few(double width_m, const Pose& T_previous_lidar);
-  void take_if_more_upright(const IcpResult& other, double share);
+  IcpResult align_points(std::span<const Eigen::Vector3f> points, double width_m, const Pose& T_previous_lidar,
+                         const std::optional<PosePrior>& prior) const;
+  // Take another pose where so large a share of what lies on upright surfaces there is more than at the best one.
+  void try_upright(double share, double width_m, const Pose& T_previous_lidar);
+  void take_if_more_upright(double share, const IcpResult& other);
+  bool is_more_upright(double share, const IcpResult& other) const;
   void try_turned(const Pose& T_previous_lidar, double turn_deg);
   Pose from_previous(const IcpResult& found) const { return track_.T_odom_lidar.inverse() * found.T_target_source; }
 

@@ -15,7 +15,7 @@ void TrackState::advance(double stamp_s, const MatcherScan& scan, const ScanMatc
   untracked_m = match.is_tracked ? 0.0 : untracked_m + match.measured_m.value_or(0.0);
   if (match.is_tracked) {
     tracked_stamp_s = stamp_s;
-    last_sideways = match.matched_sideways;
+    last_sideways = match.icp.matched_sideways;
     last_view.set(scan.map_points, match.T_odom_lidar);
     T_odom_tracked = match.T_odom_lidar;
   }
@@ -29,7 +29,7 @@ void TrackState::learn(double stamp_s, const ScanMatch& match) {
   if (match.is_tracked) {
     squared_prediction_error_m2 +=
         share * (match.prediction_error_m * match.prediction_error_m - squared_prediction_error_m2);
-    typical_match += share * (match.matched - typical_match);
+    typical_match += share * (match.icp.matched - typical_match);
     if (match.is_turn_measured) imu_trust.compare(match.T_previous_predicted, match.T_previous_lidar);
   }
   const double gap_s = stamp_s - last_stamp_s;
@@ -38,7 +38,8 @@ void TrackState::learn(double stamp_s, const ScanMatch& match) {
     velocity = {};
     return;
   }
-  velocity.advance(gap_s, match.T_previous_lidar, match.position_information);
+  velocity.advance(gap_s, match.T_previous_lidar,
+                   match.is_tracked ? match.icp.position_information : Eigen::Matrix3d::Zero());
   motion = match.is_tracked ? motion_found(match.T_previous_lidar, stamp_s) : twist_of(match.T_previous_lidar, gap_s);
   motion->linear_mps = velocity.velocity_mps();
 }

@@ -11,8 +11,8 @@ ScanMatch moved(const TrackState& track, double step_m, bool is_tracked = true) 
   ScanMatch match;
   match.T_previous_lidar = planar_pose(step_m, 0.0, 0.0);
   match.T_odom_lidar = track.T_odom_lidar * match.T_previous_lidar;
-  match.position_information = 1e6 * Eigen::Matrix3d::Identity();
-  match.matched = 0.8;
+  match.icp.position_information = 1e6 * Eigen::Matrix3d::Identity();
+  match.icp.matched = 0.8;
   match.is_tracked = is_tracked;
   return match;
 }

@@ -16,8 +16,9 @@ namespace revisit {
 namespace {
 
 struct Steps {
-  static constexpr double kAllPointsBelow_m =
-      1.0;  ///< kernel width: while wider, a quarter of the points gives the step
+  static constexpr double kAllPointsBelow_m = 1.0;  ///< kernel width: while wider, a quarter of the points will do
+  static constexpr std::size_t kStrideWhereWide = 4;
+  static constexpr int kMostOfSome = 40;  ///< steps with some of the points, which may go to and fro for ever
   static constexpr std::size_t kPointsATask = 1024;
   static constexpr std::size_t kFewestPairs = 20;
   static constexpr double kShrink = 0.7;       ///< of the kernel's width, once the pose is steady
@@ -108,6 +109,13 @@ Eigen::Vector3d fixed_by(const Eigen::Vector3d& normal, const Pose& T, double le
   const Eigen::Vector3d z_axis = T.linear().col(2);
   const double cosine = normal.dot(z_axis);
   return std::abs(cosine) > least_cosine ? Eigen::Vector3d(std::copysign(1.0, cosine) * z_axis) : normal;
+}
+
+// How the source is stepped through: while the kernel is wide, or the pose far from settled, some of its points give
+// the step as well as all.
+std::size_t stride_of(std::size_t points, std::size_t settles_with, double width_m) {
+  const std::size_t stride = settles_with > 0 ? std::max(std::size_t{1}, points / settles_with) : 1;
+  return width_m > Steps::kAllPointsBelow_m ? std::max(Steps::kStrideWhereWide, stride) : stride;
 }
 
 // Points [begin, end) of the source in steps of `stride`, at kernel width `width_m`.
@@ -207,11 +215,9 @@ Vector6 solution(const Equations& sum, const Pose& T, double noise_m) {
 }
 
 // One Gauss-Newton step; false where the points do not fix the pose.
-bool step(const Surface& target, Points source, const IcpOptions& options, double width_m, double noise_m, Met& met,
-          IcpResult& result, double& moved) {
+bool step(const Surface& target, Points source, const IcpOptions& options, std::size_t stride, double width_m,
+          double noise_m, Met& met, IcpResult& result, double& moved) {
   Pose& T = result.T_target_source;
-  // While the kernel is wide, some of the points give the step as well as all.
-  const std::size_t stride = width_m > Steps::kAllPointsBelow_m ? 4 : 1;
   // Split and summed in one order, whatever the number of threads.
   Equations sum = tbb::parallel_deterministic_reduce(
       tbb::blocked_range<std::size_t>(0, source.size(), Steps::kPointsATask * stride), Equations{},
@@ -254,12 +260,19 @@ IcpResult align_icp(const Surface& target, std::span<const Eigen::Vector3f> sour
   result.T_target_source = T_guess_target_source;
   double width_m = options.coarse_m;
   Met met(source.size());
+  std::size_t settles_with = options.settles_with;
   for (; result.iterations < options.most_iterations; ++result.iterations) {
     double moved = 0.0;
     result.converged = false;
-    if (!step(target, source, options, width_m, 0.0, met, result, moved)) break;
+    if (result.iterations == Steps::kMostOfSome) settles_with = 0;
+    const std::size_t stride = stride_of(source.size(), settles_with, width_m);
+    if (!step(target, source, options, stride, width_m, 0.0, met, result, moved)) break;
     result.last_step_m = moved;
     const bool fine = width_m <= options.fine_m;
+    if (fine && stride > 1) {
+      if (moved < Steps::kToAndFro_m) settles_with = 0;
+      continue;
+    }
     if (fine && result.matched < options.least_matched) break;
     result.converged = fine && moved < Steps::kToAndFro_m;
     if (fine && moved < options.settled_m) break;
@@ -270,7 +283,7 @@ IcpResult align_icp(const Surface& target, std::span<const Eigen::Vector3f> sour
     IcpResult tilted = result;
     double moved = options.settled_m;
     for (int i = 0; i < Steps::kMostTilts && moved >= options.settled_m; ++i)
-      if (!step(target, source, options, width_m, options.noise_m, met, tilted, moved)) return result;
+      if (!step(target, source, options, 1, width_m, options.noise_m, met, tilted, moved)) return result;
     result.T_target_source = tilted.T_target_source;
   }
   return result;

@@ -2,6 +2,7 @@
 #include <revisit/registration/icp.hpp>
 
 #include <tuple>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -110,6 +111,23 @@ TEST(Icp, GivesUpEarlyWhereTooLittleMatches) {
   EXPECT_LT(result.iterations, patient.iterations);
   const SurfaceCloud here(thin_scan(SyntheticWorld::at(0.5, 0, 0), 2));
   EXPECT_TRUE(align_icp(a, here.points(), Pose::Identity(), {.least_matched = 0.3}).converged);
+}
+
+// Some of the points lead near the optimum; where it is, all of them decide.
+TEST(Icp, SomePointsLeadToWhereAllSettle) {
+  const Pose T_a = SyntheticWorld::at(0, 0, 0), T_b = SyntheticWorld::at(0.3, 0.1, to_radians(1.0));
+  const SurfaceCloud a(thin_scan(T_a)), b(thin_scan(T_b, 2));
+  constexpr std::size_t kSome = 400;
+  std::vector<Eigen::Vector3f> few;
+  for (std::size_t i = 0; i < b.points().size(); i += b.points().size() / kSome) few.push_back(b.points()[i]);
+  const IcpResult with_all = align_icp(a, b.points(), Pose::Identity(), {.coarse_m = 1.0}),
+                  with_some = align_icp(a, b.points(), Pose::Identity(), {.coarse_m = 1.0, .settles_with = kSome}),
+                  with_few = align_icp(a, few, Pose::Identity(), {.coarse_m = 1.0});
+  EXPECT_TRUE(with_some.converged);
+  EXPECT_LT(error_m(with_some.T_target_source, with_all.T_target_source), 1e-3);
+  EXPECT_LT(error_deg(with_some.T_target_source, with_all.T_target_source), 0.01);
+  EXPECT_NEAR(with_some.matched, with_all.matched, 1e-3);
+  EXPECT_GT(error_m(with_few.T_target_source, with_all.T_target_source), 5e-3) << "they alone settle elsewhere";
 }
 
 TEST(Icp, OfAScanWithItselfIsTheIdentity) {
