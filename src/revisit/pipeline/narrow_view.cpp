@@ -51,4 +51,13 @@ void NarrowView::widen(PreparedScan& scan) {
   scan.geometry = std::make_shared<ScanGeometry>(*scan.geometry, scan.cloud.before);
 }
 
+void NarrowView::widen(PreparedScan& scan, const OdometryStep& odometry) {
+  if (!odometry.is_connected) ++interruptions_;
+  if (!scan.geometry) scan.geometry = std::make_shared<ScanGeometry>(scan.cloud);
+  scan.trajectory_point =
+      TrajectoryPoint{.segment = interruptions_, .T_segment_lidar = odometry.T_odom_lidar, .origin = odometry.segment};
+  widen(scan);
+  scan.trajectory_point.reset();
+}
+
 }  // namespace revisit

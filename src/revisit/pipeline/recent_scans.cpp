@@ -2,11 +2,13 @@
 #include <revisit/pipeline/recent_scans.hpp>
 
 #include <algorithm>
+#include <cmath>
 
 namespace revisit {
 namespace {
 
 constexpr double kVoxel_m = 0.25;
+constexpr float kLargest_m = 1e6f;  // beyond what any sensor sees
 
 }  // namespace
 
@@ -23,6 +25,16 @@ void RecentScans::add(const PreparedScan& scan) {
   thinned.all.is_ground = cloud.is_ground;
   scans_.push_back(std::move(thinned));
   if (scans_.size() > most_) scans_.pop_front();
+}
+
+// Where somebody altered the state of a run, too.
+bool RecentScans::Thinned::is_sound() const {
+  const auto is_near = [](const Point& p) {
+    return std::abs(p.x) < kLargest_m && std::abs(p.y) < kLargest_m && std::abs(p.z) < kLargest_m &&
+           std::isfinite(p.intensity);
+  };
+  return all.points.size() == all.is_ground.size() && std::all_of(all.points.begin(), all.points.end(), is_near) &&
+         at.T_segment_lidar.linear().isUnitary(1e-6) && at.T_segment_lidar.translation().allFinite();
 }
 
 void RecentScans::append(const Thinned& scan, Points& to) const {

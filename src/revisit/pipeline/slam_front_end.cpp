@@ -42,7 +42,7 @@ Result<SlamFrontEnd::Step> SlamFrontEnd::step(Scan scan, const std::optional<Pos
                            (odometry.is_tracked &&
                             selection_.is_keyframe(odometry.T_odom_lidar,
                                                    odometry.compensated.empty() ? scan.points : odometry.compensated));
-  if (!is_keyframe && !makes_a_pair(odometry)) {
+  if (!is_keyframe && !makes_a_pair(odometry) && !is_narrow_) {
     set_previous(nullptr);
     return step;
   }
@@ -72,9 +72,13 @@ bool SlamFrontEnd::makes_a_pair(const OdometryStep& odometry) const {
 
 Result<PreparedScan> SlamFrontEnd::prepare(Scan scan, const OdometryStep& odometry) {
   auto prepared = preparation_.prepare(std::move(scan), odometry.motion);
-  if (!prepared || typical_.pairs() >= kTypicalPairs) return prepared;
-  prepared->geometry = std::make_shared<ScanGeometry>(prepared->cloud);
-  if (makes_a_pair(odometry)) typical_.add(*previous_, *prepared->geometry, odometry.T_previous_lidar);
+  if (!prepared) return prepared;
+  if (typical_.pairs() < kTypicalPairs) {
+    prepared->geometry = std::make_shared<ScanGeometry>(prepared->cloud);
+    if (makes_a_pair(odometry)) typical_.add(*previous_, *prepared->geometry, odometry.T_previous_lidar);
+  }
+  is_narrow_ = prepared->cloud.seen.sector().is_narrow();
+  if (is_narrow_) narrow_view_.widen(*prepared, odometry);
   return prepared;
 }
 

@@ -6,6 +6,7 @@
 
 #include <revisit/odometry/keyframe_selection.hpp>
 #include <revisit/odometry/odometry.hpp>
+#include <revisit/pipeline/narrow_view.hpp>
 #include <revisit/pipeline/prepare.hpp>
 #include <revisit/store/sensor_facts.hpp>
 #include <revisit/store/stored_map.hpp>
@@ -41,7 +42,7 @@ class SlamFrontEnd {
   /// on.
   void begin_at_segment(int segment, const std::optional<SensorFacts>& sensor = std::nullopt);
   void archive(auto& fields) {
-    fields(odometry_, selection_, preparation_, typical_, keyframe_segment_, previous_cloud_);
+    fields(odometry_, selection_, preparation_, typical_, narrow_view_, is_narrow_, keyframe_segment_, previous_cloud_);
     if (fields.kReads) previous_ = previous_cloud_ ? std::make_shared<ScanGeometry>(*previous_cloud_) : nullptr;
   }
 
@@ -57,6 +58,8 @@ class SlamFrontEnd {
   KeyframeSelection selection_;
   ScanPreparation preparation_;
   TypicalAgreementEstimate typical_;
+  NarrowView narrow_view_;
+  bool is_narrow_ = false;               ///< the sensor: every scan is made ready, for what it shows beside key frames
   std::optional<int> keyframe_segment_;  ///< of the last key frame, if there is one
   // Of the scan before, where it was a key frame and pairs are learnt.
   std::optional<ThinCloud> previous_cloud_;

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/pipeline/slam.hpp>
 
+#include <cmath>
 #include <filesystem>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
+
+#include <revisit/store/keyframe_bytes.hpp>
 
 #include "synthetic_world.hpp"
 
@@ -216,6 +220,39 @@ TEST(Slam, GoesOnAsIfItHadNotBeenKilled) {
     EXPECT_EQ(drive.slam->store().edges()->size(), whole.slam->store().edges()->size());
   }
   EXPECT_GE(loops, whole.loops);
+}
+
+// What a sensor of 130 degrees saw before each key frame is stored with it, and kept beside the map meanwhile.
+TEST(Slam, ANarrowSensorsKeyFramesHoldWhatWasSeenBefore) {
+  const auto go = [](Drive& drive, int first, int last) {
+    for (int i = first; i < last; ++i) {
+      Scan scan = scan_at(i);
+      std::erase_if(scan.points, [](const Point& p) { return std::abs(std::atan2(p.y, p.x)) > to_radians(65.0); });
+      drive.feed(std::move(scan));
+    }
+  };
+  const auto places_of = [](const Drive& drive) {
+    std::vector<Bytes> places;
+    for (const FrameId frame : drive.slam->graph().keyframes())
+      places.push_back(*drive.slam->store().part(frame, MapStore::Part::kPlace));
+    return places;
+  };
+  constexpr int kFrom = kOut - 30, kTo = kOut;
+  Drive whole("narrow");
+  go(whole, kFrom, kTo);
+  const auto places = places_of(whole);
+  ASSERT_GT(places.size(), 5u);
+  EXPECT_FALSE(to_thin_cloud(places.front())->before) << "nothing was";
+  EXPECT_TRUE(to_thin_cloud(places.back())->before);
+  for (int killed = 0, done = kFrom; const int at : {kFrom + 7, kFrom + 18, kTo}) {
+    Drive drive("narrow_killed", killed++ == 0);
+    ASSERT_TRUE(drive.slam) << at;
+    if (const auto last = drive.slam->last_frame()) done = static_cast<int>(last->value) + 1;
+    go(drive, done, at);
+    if (at == kTo) {
+      EXPECT_EQ(places_of(drive), places);
+    }
+  }
 }
 
 // A map may come from anybody: whatever its state says, it is refused, or a run goes on with it.

@@ -164,7 +164,8 @@ Status upgrade(sqlite3* database, const std::string& file, int version) {
     for (const char* table : kTablesOf2) sql += "DROP TABLE old_" + std::string(table) + ";";
   }
   if (version < 4) sql += kSinceVersion4;
-  sql += kSinceVersion5 + numbers_of_the_file() + "COMMIT;";
+  if (version < 5) sql += kSinceVersion5;
+  sql += numbers_of_the_file() + "COMMIT;";  // since version 6 places may hold what was seen before
   Status status = run_all(database, file, sql);
   if (!status && sqlite3_get_autocommit(database) == 0) (void)run_all(database, file, "ROLLBACK");
   return status;

@@ -126,6 +126,20 @@ TEST(MapSchema, AMapOfVersion4IsUpgraded) {
   EXPECT_EQ(store->state()->size(), 10u);
 }
 
+TEST(MapSchema, AMapOfVersion5IsUpgraded) {
+  const fs::path file = map_of_version_2();
+  {
+    auto store = MapStore::open(file);
+    ASSERT_TRUE(store->set_state(Bytes(10, std::byte{1})) && store->commit());
+  }
+  run_sql(file, "PRAGMA user_version=5");
+  EXPECT_EQ(MapStore::open(file, MapStore::Access::kRead)->state()->size(), 10u);
+  const auto store = MapStore::open(file);
+  ASSERT_TRUE(store) << store.error().message;
+  EXPECT_EQ(store->state()->size(), 10u);
+  EXPECT_EQ(store->keyframes()->size(), 2u);
+}
+
 TEST(MapSchema, AMapOfALaterVersionIsRefusedAndLeftAsItIs) {
   const fs::path file = map_of_version_2();
   run_sql(file, "PRAGMA user_version=99");

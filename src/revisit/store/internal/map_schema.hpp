@@ -10,7 +10,7 @@
 namespace revisit::store_internal {
 
 /// How a map lies in its file (docs/maps.md), and how files of earlier versions become it.
-inline constexpr int kApplication = 0x52565354, kVersion = 5;
+inline constexpr int kApplication = 0x52565354, kVersion = 6;
 /// A map of this version is read as it is: it lacks what may be empty.
 inline constexpr int kOldestReadable = 3;
 
