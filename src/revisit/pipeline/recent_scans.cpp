@@ -27,7 +27,7 @@ void RecentScans::add(const PreparedScan& scan) {
   if (scans_.size() > most_) scans_.pop_front();
 }
 
-// Where somebody altered the state of a run, too.
+// The state of a run may have been altered: what is read back must not break what works with it.
 bool RecentScans::Thinned::is_sound() const {
   const auto is_near = [](const Point& p) {
     return std::abs(p.x) < kLargest_m && std::abs(p.y) < kLargest_m && std::abs(p.z) < kLargest_m &&

@@ -222,7 +222,7 @@ TEST(Slam, GoesOnAsIfItHadNotBeenKilled) {
   EXPECT_GE(loops, whole.loops);
 }
 
-// What a sensor of 130 degrees saw before each key frame is stored with it, and kept beside the map meanwhile.
+// What a sensor of 130 degrees saw before each key frame is stored with it, also by a run that was killed and goes on.
 TEST(Slam, ANarrowSensorsKeyFramesHoldWhatWasSeenBefore) {
   const auto go = [](Drive& drive, int first, int last) {
     for (int i = first; i < last; ++i) {

@@ -41,7 +41,7 @@ struct IcpOptions {
   double least_reach_m = 0.0;  ///< points look for a patch within the kernel's width, or this where it is larger
   double settled_m = 2e-4;     ///< done where a step at the last width moves points 20 m away less than this
   int most_iterations = 60;
-  /// So many points of the source, about, give the steps until it hardly moves, then all of them. 0: all throughout.
+  /// Points of the source, about, that give the steps until it hardly moves; then all of them do. 0: all throughout.
   std::size_t settles_with = 0;
   double least_matched = 0.0;  ///< given up where, at the last width, a smaller share matches: another place
   /// Directions in which the surfaces' normals have on average a smaller square share than this stay as guessed: along
