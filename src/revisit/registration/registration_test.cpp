@@ -210,6 +210,15 @@ TEST(SurfaceCloud, AViewCutOffIsInTheOpenWhereItIsNotClosedIn) {
   EXPECT_FALSE(sees(24.f, 90, 5, 200)) << "a narrow view fills few azimuths";
 }
 
+TEST(SurfaceCloud, BeneathARoofIsNoOpen) {
+  const auto sees = [](float range_m, int highest_deg) {
+    return SurfaceCloud(thin(met_at(range_m, [=](int) { return highest_deg; }), {}, 1.0)).is_in_the_open();
+  };
+  EXPECT_FALSE(sees(45.f, 15)) << "a hall";
+  EXPECT_TRUE(sees(65.f, 15)) << "a street between trees";
+  EXPECT_FALSE(sees(65.f, 44)) << "a large hall";
+}
+
 TEST(Agreement, AWallFixesNothingAlongItself) {
   std::vector<Point> wall, corner;
   for (float x = -8.f; x < 8.f; x += 0.2f)

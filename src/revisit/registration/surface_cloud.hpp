@@ -83,7 +83,8 @@ class SurfaceCloud final : public Surface {
   /// Edge of the voxels that the cloud was thinned with.
   double voxel_m() const { return static_cast<double>(cloud_.voxel_m); }
   /// No room, as far as one scan shows: it fills many voxels, or sees farther than rooms reach, or sees all round and
-  /// is not closed in; and has no roof. A narrow sensor fills few voxels anywhere.
+  /// is not closed in; and has no roof. Beams that hardly look up meet crowns and houses for a roof: it counts where
+  /// they see no farther than halls reach. A narrow sensor fills few voxels anywhere.
   bool is_in_the_open() const;
   float intensity(std::size_t i) const { return cloud_.intensity[i]; }
   const SeenSpace& seen() const { return cloud_.seen; }
