@@ -21,8 +21,14 @@ namespace {
 constexpr double kReach_m = 12.0;   // scans farther apart share too little
 constexpr std::size_t kStarts = 6;  // poses from overhead that are registered
 // Who asks how two scans lie to each other believes that they show one place; of candidates for a loop nearly all do
-// not. Rooms fit one another, and themselves turned by 90 degrees.
-constexpr double kPrior_log_odds = 5.0, kPriorOfRooms_log_odds = 3.0;
+// not. Then one pose is right, and in the open it fits far better than all others: what is 8 log odds ahead of them or
+// less is hardly believed, what is 16 ahead is, though less of it fits (docs/accuracy.md, "Two scans without a guess").
+struct Believing {
+  static constexpr double kPrior_log_odds = 2.0, kStandingOut_log_odds = 8.0;
+  static constexpr double kBegins_log_odds = 8.0, kFar_log_odds = 16.0;  ///< ahead
+  /// Rooms fit one another, and themselves turned by 90 degrees.
+  static constexpr double kInRooms_log_odds = 3.0;
+};
 // Of two scans in a row, intensities correlate by .83 (HDL-64E) to .97 (OS0-128); which sensor this is, nobody knows.
 constexpr double kTypicalIntensities = 0.85;
 constexpr double kOther_m = 1.0, kOther_rad = 0.2;  // poses farther apart exclude each other
@@ -47,14 +53,26 @@ CandidateView view_from(const Pose& T_guess_target_source, double overlap) {
   return view;
 }
 
+// What speaks for the pose besides both scans, as far as the likeliest of the others shows it. One pose is right at
+// most: what another explains as well speaks against this one.
+double log_odds_beside(const GeometricEvidence& best, const std::optional<double>& likeliest_other) {
+  double prior = Believing::kInRooms_log_odds;
+  if (best.evidence.in_the_open) {
+    const double ahead = likeliest_other ? best.own_log_odds - *likeliest_other : 0.0;
+    prior = Believing::kPrior_log_odds +
+            Believing::kStandingOut_log_odds * std::clamp((ahead - Believing::kBegins_log_odds) /
+                                                              (Believing::kFar_log_odds - Believing::kBegins_log_odds),
+                                                          0.0, 1.0);
+  }
+  return likeliest_other ? prior - std::log1p(std::exp(*likeliest_other + prior)) : prior;
+}
+
 // Every heading and position seen from overhead; the ones that share most are registered, the surest is the answer.
 RegisteredPair register_without_guess(const ThinCloud& target_cloud, const ThinCloud& source_cloud,
                                       const GeometricOptions& options) {
   RegisteredPair pair{ScanGeometry(target_cloud), ScanGeometry(source_cloud), {}};
   OverheadSearch search(source_cloud);
   const auto starts = search.search(target_cloud, 0.0, kPi, kReach_m, kStarts);
-  const double prior =
-      PairScale(pair.target.surface(), pair.source.surface()).in_the_open ? kPrior_log_odds : kPriorOfRooms_log_odds;
   std::vector<GeometricEvidence> found(starts.size());
   tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
     const Pose T_guess = upright_pose(target_cloud.up).inverse() *
@@ -63,12 +81,11 @@ RegisteredPair register_without_guess(const ThinCloud& target_cloud, const ThinC
   });
   GeometricEvidence& best = pair.found = *std::max_element(
       found.begin(), found.end(), [](const auto& a, const auto& b) { return a.own_log_odds < b.own_log_odds; });
-  // One pose is right at most: what another explains as well speaks against this one.
-  double others = 0.0;
+  std::optional<double> likeliest_other;
   for (const GeometricEvidence& each : found)
     if (is_other(each.T_match_query, best.T_match_query))
-      others = std::max(others, std::exp(each.own_log_odds + prior));
-  decide(best, 0.0, prior - std::log1p(others), options);
+      likeliest_other = std::max(each.own_log_odds, likeliest_other.value_or(each.own_log_odds));
+  decide(best, 0.0, log_odds_beside(best, likeliest_other), options);
   return pair;
 }
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <revisit/pipeline/register_scans.hpp>
 
+#include <cmath>
 #include <limits>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -37,6 +39,21 @@ TEST(RegisterScans, ScansOfTwoPlacesAreRefused) {
                                     SyntheticWorld(52).scan(SyntheticWorld::at(0, 0, 0), kDenseSensor));
   ASSERT_TRUE(found);
   EXPECT_FALSE(found->is_accepted());
+}
+
+// Six tenths of what is around have changed: little fits at the right pose, and less anywhere else.
+TEST(RegisterScans, APoseThatStandsOutIsBelievedThoughLittleFits) {
+  const SyntheticWorld world(51), changed(151);
+  const Pose T_target = SyntheticWorld::at(4, 0, 0), T_source = SyntheticWorld::at(6, 1, 1.7);
+  const auto is_changed = [](const Point& p) { return std::atan2(p.y, p.x) <= 0.2 * kPi; };
+  Scan source = world.scan(T_source, kDenseSensor, 1);
+  std::erase_if(source.points, is_changed);
+  for (const Point& p : changed.scan(T_source, kDenseSensor, 2).points)
+    if (is_changed(p)) source.points.push_back(p);
+  const auto found = register_scans(source, world.scan(T_target, kDenseSensor, 3));
+  ASSERT_TRUE(found);
+  EXPECT_LT(((T_target.inverse() * T_source).inverse() * found->T_target_source).translation().norm(), 0.05);
+  EXPECT_GT(found->probability, 0.95);
 }
 
 // NaN, (0,0,0) and intensities in the thousands: what a driver delivers.
