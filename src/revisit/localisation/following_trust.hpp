@@ -9,7 +9,7 @@ namespace revisit {
 
 /// Whether a robot that is followed through rooms of a map is still believed to be where it is followed. If it woke up
 /// in a look-alike, the next scans can be registered there, but fit less well than in the right place: what each view
-/// has beyond log odds of PoseBelief::kAskedInRooms is added up, and below 0 the robot is lost. A value: safe to copy
+/// has beyond log odds of PoseBelief::kAskedOfAlike is added up, and below 0 the robot is lost. A value: safe to copy
 /// and to read from several threads.
 class FollowingTrust {
  public:
@@ -19,7 +19,7 @@ class FollowingTrust {
     const double view = std::clamp(travelled_m / PoseBelief::kAnotherView_m, 0.0, 1.0);
     FollowingTrust next;
     next.log_odds_ =
-        std::min(kMost, log_odds_ + view * std::clamp(own_log_odds - PoseBelief::kAskedInRooms, -kOneView, kOneView));
+        std::min(kMost, log_odds_ + view * std::clamp(own_log_odds - PoseBelief::kAskedOfAlike, -kOneView, kOneView));
     return next;
   }
   bool is_gone() const { return log_odds_ < 0.0; }

@@ -8,21 +8,21 @@ namespace revisit {
 namespace {
 
 struct Adding {
-  static constexpr double kMetresARadian = 3.0;                     ///< a turn shows as much anew as so many metres
-  static constexpr double kMost = 6.0;                              ///< log odds that one view adds, either way
-  static constexpr double kNotAlone = 2.0, kNotAloneInRooms = 1.0;  ///< and one that does not decide alone
-  static constexpr double kNotSeenAgain = -1.0;                     ///< for a view that does not confirm it
-  static constexpr double kForgotten = -12.0;                       ///< log odds
+  static constexpr double kMetresARadian = 3.0;           ///< a turn shows as much anew as so many metres
+  static constexpr double kMost = 6.0;                    ///< log odds that one view adds, either way
+  static constexpr double kNotAlone = 2.0, kAlike = 1.0;  ///< and one that does not decide alone
+  static constexpr double kNotSeenAgain = -1.0;           ///< for a view that does not confirm it
+  static constexpr double kForgotten = -12.0;             ///< log odds
   // Two poses are the same within this, and so much more for what was travelled in between.
   static constexpr double kSame_m = 0.5, kSame_mAMetre = 0.02, kSame_deg = 3.0;
 };
 
 }  // namespace
 
-double PoseBelief::log_odds_of_view(double own_log_odds, bool decides_alone, bool in_the_open) {
+double PoseBelief::log_odds_of_view(double own_log_odds, bool decides_alone, bool resembles_others) {
   if (decides_alone) return own_log_odds;
-  return in_the_open ? std::min(own_log_odds, Adding::kNotAlone)
-                     : std::min(own_log_odds - kAskedInRooms, Adding::kNotAloneInRooms);
+  return resembles_others ? std::min(own_log_odds - kAskedOfAlike, Adding::kAlike)
+                          : std::min(own_log_odds, Adding::kNotAlone);
 }
 
 void PoseBelief::add(const TrajectoryPoint& point, std::span<const Sighting> sightings) {
@@ -47,13 +47,13 @@ void PoseBelief::add(const TrajectoryPoint& point, std::span<const Sighting> sig
     });
     if (known == hypotheses_.end()) {
       hypotheses_.push_back({sighting.match, sighting.part, T_map_segment, sighting.log_odds + sighting.prior_log_odds,
-                             sighting.in_the_open});
+                             sighting.resembles_others});
       continue;
     }
     const auto i = static_cast<std::size_t>(known - hypotheses_.begin());
     known->match = sighting.match;
     known->T_map_segment = T_map_segment;
-    known->in_the_open = sighting.in_the_open;
+    known->resembles_others = sighting.resembles_others;
     if (i >= is_seen.size()) {  // of this scan already: another place says the same
       known->log_odds = std::max(known->log_odds, sighting.log_odds + sighting.prior_log_odds);
     } else if (!is_seen[i]) {

@@ -46,23 +46,23 @@ TEST(PoseBelief, TheSameViewCountsOnce) {
   EXPECT_LT(drive.belief.best()->log_odds, 1.1);
 }
 
-// Rooms ask for more, and go on to do so where a scan saw something else.
-TEST(PoseBelief, RemembersWhetherItWasSeenInARoom) {
+// What resembles others must show more, and goes on to do so where a scan saw something else.
+TEST(PoseBelief, RemembersWhetherItResemblesOthers) {
   Drive drive;
   auto sighting = drive.seen(4.0);
-  EXPECT_TRUE(sighting.in_the_open);
-  sighting.in_the_open = false;
+  EXPECT_FALSE(sighting.resembles_others);
+  sighting.resembles_others = true;
   drive.belief.add(drive.point, std::span(&sighting, 1));
-  EXPECT_FALSE(drive.belief.best()->in_the_open);
+  EXPECT_TRUE(drive.belief.best()->resembles_others);
   drive.go(0.3);
   const auto other = drive.seen(1.0, planar_pose(40, 0, 0), 2);
   drive.belief.add(drive.point, std::span(&other, 1));
   EXPECT_EQ(drive.belief.best()->match, FrameId{1});
-  EXPECT_FALSE(drive.belief.best()->in_the_open);
+  EXPECT_TRUE(drive.belief.best()->resembles_others);
   drive.go(0.3);
   const auto again = drive.seen(1.0);
   drive.belief.add(drive.point, std::span(&again, 1));
-  EXPECT_TRUE(drive.belief.best()->in_the_open) << "it went out of the door";
+  EXPECT_FALSE(drive.belief.best()->resembles_others) << "it went out of the door";
 }
 
 // Two places look alike; further on only one of them fits.
@@ -116,12 +116,12 @@ TEST(PoseBelief, AnotherSegmentBeginsAnew) {
 }
 
 TEST(PoseBelief, AViewThatDoesNotDecideAloneCountsLittle) {
-  for (const bool in_the_open : {true, false}) EXPECT_EQ(PoseBelief::log_odds_of_view(7.0, true, in_the_open), 7.0);
-  EXPECT_EQ(PoseBelief::log_odds_of_view(5.0, false, true), 2.0);
-  EXPECT_EQ(PoseBelief::log_odds_of_view(1.5, false, true), 1.5);
-  EXPECT_EQ(PoseBelief::log_odds_of_view(5.0, false, false), 1.0);
-  EXPECT_EQ(PoseBelief::log_odds_of_view(1.5, false, false), 0.5) << "rooms are alike";
-  EXPECT_EQ(PoseBelief::log_odds_of_view(-3.0, false, false), -4.0);
+  for (const bool alike : {true, false}) EXPECT_EQ(PoseBelief::log_odds_of_view(7.0, true, alike), 7.0);
+  EXPECT_EQ(PoseBelief::log_odds_of_view(5.0, false, false), 2.0);
+  EXPECT_EQ(PoseBelief::log_odds_of_view(1.5, false, false), 1.5);
+  EXPECT_EQ(PoseBelief::log_odds_of_view(5.0, false, true), 1.0);
+  EXPECT_EQ(PoseBelief::log_odds_of_view(1.5, false, true), 0.5) << "rooms are alike";
+  EXPECT_EQ(PoseBelief::log_odds_of_view(-3.0, false, true), -4.0);
 }
 
 }  // namespace

@@ -70,8 +70,8 @@ class Localiser {
   Result<std::optional<Twist>> motion_of(const PreparedScan& scan, const Detection& detection) const;
   /// The places nearest to a pose in a part of the map, the nearest first, with the pose relative to each.
   std::vector<PosePrediction> nearest_places(const Pose& T_map_lidar, int part, std::size_t count) const;
-  /// Whether scans in a row showed enough. In rooms as much as one scan that decides alone: look-alikes go on for
-  /// metres.
+  /// Whether scans in a row showed enough. Of what resembles others as much as one scan that decides alone: look-alikes
+  /// go on for metres.
   bool is_sure(const PoseBelief::Hypothesis& best) const;
   /// Registers the scan with the places beside the likeliest pose, where that is not accepted: one of them may be
   /// enough, or several together.
@@ -81,6 +81,12 @@ class Localiser {
   Status look_where_expected(const PreparedScan& scan, const TrajectoryPoint& point, Detection& detection);
   /// What it is worth to be where somebody expects it: as much as there is elsewhere.
   double expectation_log_odds(const Pose& T_map_lidar, int part, const TrajectoryPoint& point) const;
+  /// How many places of the map are not near to the pose for each one that is, as log odds.
+  double log_odds_of_elsewhere(const Pose& T_map_lidar, int part) const;
+  PoseBelief::Sighting sighting(FrameId match, const GeometricEvidence& found) const;
+  /// A scan was registered beside where odometry predicts it, but near: adds it to the belief, and says whether that is
+  /// sure.
+  bool believe_beside(const PosePrediction& prediction, const GeometricEvidence& found, const TrajectoryPoint& point);
   Localisation found(FrameId frame, const LoopConstraint& loop) const;
 
   /// Takes the loop away from one scan of a sector or a room that does not decide alone: the refusal says so.

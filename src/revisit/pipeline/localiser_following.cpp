@@ -25,6 +25,11 @@ struct Expecting {
   static constexpr std::size_t kPlaces = 4;
 };
 
+bool is_near(const Pose& T_expected, const Pose& T) {
+  const Pose off = T_expected.inverse() * T;
+  return off.translation().norm() <= Expecting::kNear_m && rotation_angle(off) <= to_radians(Expecting::kNear_deg);
+}
+
 // What a pose is known to be after so much odometry.
 Matrix6 after_motion(const Matrix6& information, double metres) {
   if (information.isZero() || metres <= 0.0) return information;
@@ -68,7 +73,7 @@ Result<Localisation> Localiser::follow(Scan scan, const std::optional<Pose>& T_e
 
 bool Localiser::is_sure(const PoseBelief::Hypothesis& best) const {
   return probability_of(best.log_odds) >= parameters_.geometric.min_probability &&
-         (best.in_the_open || best.log_odds >= GeometricEvidence::kSureInRooms_log_odds);
+         (!best.resembles_others || best.log_odds >= GeometricEvidence::kSureInRooms_log_odds);
 }
 
 Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const TrajectoryPoint& point) {
@@ -79,13 +84,8 @@ Result<Localisation> Localiser::wake_up(const PreparedScan& scan, const Trajecto
     if (const Status looked = look_where_expected(scan, point, *detection); !looked) return looked.error();
   std::vector<PoseBelief::Sighting> sightings;
   for (const Detection::Registered& each : detection->registered) {
-    const Pose T_map_lidar = map_.T_map_lidar(each.match) * each.evidence.T_match_query;
-    const int part = map_.part(each.match);
-    const bool in_the_open = each.evidence.evidence.in_the_open;
-    const double log_odds =
-        PoseBelief::log_odds_of_view(each.evidence.own_log_odds, each.evidence.decides_alone(), in_the_open);
-    sightings.push_back(
-        {each.match, part, T_map_lidar, log_odds, expectation_log_odds(T_map_lidar, part, point), in_the_open});
+    sightings.push_back(sighting(each.match, each.evidence));
+    sightings.back().prior_log_odds = expectation_log_odds(sightings.back().T_map_lidar, sightings.back().part, point);
   }
   belief_.add(point, sightings);
   Localisation result;
@@ -140,12 +140,14 @@ void Localiser::expect(const Pose& T_map_lidar) {
 double Localiser::expectation_log_odds(const Pose& T_map_lidar, int part, const TrajectoryPoint& point) const {
   if (!expected_ || part != 0) return 0.0;
   const Pose T_expected = expected_->at_point(point);
-  const Pose off = T_expected.inverse() * T_map_lidar;
-  if (off.translation().norm() > Expecting::kNear_m || rotation_angle(off) > to_radians(Expecting::kNear_deg))
-    return 0.0;
+  return is_near(T_expected, T_map_lidar) ? log_odds_of_elsewhere(T_expected, part) : 0.0;
+}
+
+double Localiser::log_odds_of_elsewhere(const Pose& T_map_lidar, int part) const {
   std::size_t there = 1;
   for (const StoredMapPose& each : map_.poses())
-    there += each.part == 0 && (each.T_map_lidar.translation() - T_expected.translation()).norm() <= Expecting::kNear_m;
+    there +=
+        each.part == part && (each.T_map_lidar.translation() - T_map_lidar.translation()).norm() <= Expecting::kNear_m;
   return std::log(std::max(1.0, static_cast<double>(map_.poses().size()) / static_cast<double>(there)));
 }
 
@@ -156,6 +158,27 @@ Status Localiser::look_where_expected(const PreparedScan& scan, const Trajectory
     if (tested->geometric) detection.registered.push_back({each.match, *tested->geometric});
   }
   return ok();
+}
+
+PoseBelief::Sighting Localiser::sighting(FrameId match, const GeometricEvidence& found) const {
+  const bool resembles_others = found.evidence.resembles_others();
+  return {.match = match,
+          .part = map_.part(match),
+          .T_map_lidar = map_.T_map_lidar(match) * found.T_match_query,
+          .log_odds = PoseBelief::log_odds_of_view(found.own_log_odds, found.decides_alone(), resembles_others),
+          .resembles_others = resembles_others};
+}
+
+// Odometry, or the map, has a jump: what scans in a row say against it counts as where somebody expects it.
+bool Localiser::believe_beside(const PosePrediction& prediction, const GeometricEvidence& found,
+                               const TrajectoryPoint& point) {
+  PoseBelief::Sighting seen = sighting(prediction.match, found);
+  const Pose T_predicted = map_.T_map_lidar(prediction.match) * prediction.T_match_query;
+  if (!found.is_consistent() || !is_near(T_predicted, seen.T_map_lidar)) return false;
+  seen.prior_log_odds = log_odds_of_elsewhere(T_predicted, seen.part);
+  belief_.add(point, std::span(&seen, 1));
+  const auto best = belief_.best();
+  return best && best->T_map_segment.isApprox(seen.T_map_lidar * point.T_segment_lidar.inverse()) && is_sure(*best);
 }
 
 Result<Localisation> Localiser::stay(const PreparedScan& scan, const TrajectoryPoint& point) {
@@ -184,9 +207,11 @@ Result<Localisation> Localiser::stay(const PreparedScan& scan, const TrajectoryP
         result.reason = "what was seen over the last metres is not what the map shows here";
         return result;
       }
-      if (evidence.own_log_odds >= least &&
-          off.translation().norm() <= Staying::kMost_m + Staying::kMost_mAMetre * travelled_m &&
-          rotation_angle(off) <= to_radians(Staying::kMost_deg)) {
+      const bool is_there = evidence.own_log_odds >= least &&
+                            off.translation().norm() <= Staying::kMost_m + Staying::kMost_mAMetre * travelled_m &&
+                            rotation_angle(off) <= to_radians(Staying::kMost_deg);
+      if (is_there || believe_beside(*prediction, evidence, point)) {
+        belief_.clear();
         result.status = Localisation::Status::kFollowed;
         result.T_map_lidar = map_.T_map_lidar(prediction->match) * evidence.T_match_query;
         result.information = evidence.information;

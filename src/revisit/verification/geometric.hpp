@@ -37,11 +37,12 @@ struct GeometricEvidence {
 
   bool is_consistent() const { return !refusal; }
   /// Whether this one scan is enough to know the place. Of a room it must show more, since scans of another building
-  /// reach log odds of 5, a few of them 8 (docs/maps.md).
+  /// reach log odds of 5, a few of them 8, and of a sector of one still more (docs/maps.md).
   bool decides_alone() const {
-    return evidence.decides_alone() && (evidence.in_the_open || own_log_odds >= kSureInRooms_log_odds);
+    const double sure = evidence.both_are_narrow ? kSureInSectors_log_odds : kSureInRooms_log_odds;
+    return evidence.decides_alone() && (evidence.in_the_open || own_log_odds >= sure);
   }
-  static constexpr double kSureInRooms_log_odds = 6.0;
+  static constexpr double kSureInRooms_log_odds = 6.0, kSureInSectors_log_odds = 8.0;
 };
 
 /// What is known of a candidate before it is registered.

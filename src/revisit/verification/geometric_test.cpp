@@ -203,6 +203,10 @@ TEST(Decide, OneScanOfARoomMustShowMoreToDecideAlone) {
   EXPECT_FALSE(found.decides_alone());
   found.own_log_odds = 6.0;
   EXPECT_TRUE(found.decides_alone());
+  found.evidence.both_are_narrow = true;
+  EXPECT_FALSE(found.decides_alone()) << "a sector of it";
+  found.own_log_odds = 8.0;
+  EXPECT_TRUE(found.decides_alone());
   found.evidence.one_is_narrow = true;
   EXPECT_FALSE(found.decides_alone());
 }

@@ -32,6 +32,8 @@ struct LoopEvidence {
 
   /// Where nothing else is known of both scans: a sector of a street may be that of another one.
   bool decides_alone() const { return !one_is_narrow && !(both_are_narrow && in_the_open); }
+  /// Rooms, and sectors of streets, go on for metres as others do.
+  bool resembles_others() const { return both_are_narrow || !in_the_open; }
 };
 
 /// The log odds that the pose is right (within 0.5 m and 3 degrees), were right and wrong ones equally many: a logistic

@@ -106,6 +106,17 @@ TEST(LoopProbability, ASectorOfAStreetDecidesNothingAlone) {
   EXPECT_FALSE(evidence.decides_alone());
 }
 
+TEST(LoopProbability, RoomsAndSectorsResembleOthers) {
+  LoopEvidence evidence = usual_revisit();
+  EXPECT_FALSE(evidence.resembles_others());
+  evidence.one_is_narrow = true;
+  EXPECT_FALSE(evidence.resembles_others()) << "one sees all round, and its log odds are lowered";
+  evidence.both_are_narrow = true;
+  EXPECT_TRUE(evidence.resembles_others());
+  evidence.both_are_narrow = evidence.in_the_open = false;
+  EXPECT_TRUE(evidence.resembles_others());
+}
+
 // A room whose door is shut instead of open is another room; in the open, something drove into the way.
 TEST(LoopProbability, WhatIsHiddenCountsInRooms) {
   const auto log_odds = [](bool in_the_open, double hidden_share) {
