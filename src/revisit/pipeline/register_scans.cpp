@@ -21,11 +21,11 @@ namespace {
 constexpr double kReach_m = 12.0;   // scans farther apart share too little
 constexpr std::size_t kStarts = 6;  // poses from overhead that are registered
 // Who asks how two scans lie to each other believes that they show one place; of candidates for a loop nearly all do
-// not. Then one pose is right, and in the open it fits far better than all others: what is 8 log odds ahead of them or
-// less is hardly believed, what is 16 ahead is, though less of it fits (docs/accuracy.md, "Two scans without a guess").
-struct Believing {
-  static constexpr double kPrior_log_odds = 2.0, kStandingOut_log_odds = 8.0;
-  static constexpr double kBegins_log_odds = 8.0, kFar_log_odds = 16.0;  ///< ahead
+// not. In the open the right pose is also far ahead of all others that were tried, and a wrong one is not: the more it
+// is ahead, from kBegins to kFar, the more is added (docs/accuracy.md, "Two scans without a guess").
+struct Prior {
+  static constexpr double kInTheOpen_log_odds = 2.0, kStandingOut_log_odds = 8.0;
+  static constexpr double kBegins_log_odds = 8.0, kFar_log_odds = 16.0;  ///< ahead of the likeliest other pose
   /// Rooms fit one another, and themselves turned by 90 degrees.
   static constexpr double kInRooms_log_odds = 3.0;
 };
@@ -53,16 +53,16 @@ CandidateView view_from(const Pose& T_guess_target_source, double overlap) {
   return view;
 }
 
-// What speaks for the pose besides both scans, as far as the likeliest of the others shows it. One pose is right at
-// most: what another explains as well speaks against this one.
-double log_odds_beside(const GeometricEvidence& best, const std::optional<double>& likeliest_other) {
-  double prior = Believing::kInRooms_log_odds;
+// What is known of the best pose without its own evidence. One pose is right at most: what another explains as well
+// speaks against this one.
+double prior_log_odds(const GeometricEvidence& best, const std::optional<double>& likeliest_other) {
+  double prior = Prior::kInRooms_log_odds;
   if (best.evidence.in_the_open) {
     const double ahead = likeliest_other ? best.own_log_odds - *likeliest_other : 0.0;
-    prior = Believing::kPrior_log_odds +
-            Believing::kStandingOut_log_odds * std::clamp((ahead - Believing::kBegins_log_odds) /
-                                                              (Believing::kFar_log_odds - Believing::kBegins_log_odds),
-                                                          0.0, 1.0);
+    prior =
+        Prior::kInTheOpen_log_odds +
+        Prior::kStandingOut_log_odds *
+            std::clamp((ahead - Prior::kBegins_log_odds) / (Prior::kFar_log_odds - Prior::kBegins_log_odds), 0.0, 1.0);
   }
   return likeliest_other ? prior - std::log1p(std::exp(*likeliest_other + prior)) : prior;
 }
@@ -85,7 +85,7 @@ RegisteredPair register_without_guess(const ThinCloud& target_cloud, const ThinC
   for (const GeometricEvidence& each : found)
     if (is_other(each.T_match_query, best.T_match_query))
       likeliest_other = std::max(each.own_log_odds, likeliest_other.value_or(each.own_log_odds));
-  decide(best, 0.0, log_odds_beside(best, likeliest_other), options);
+  decide(best, 0.0, prior_log_odds(best, likeliest_other), options);
   return pair;
 }
 

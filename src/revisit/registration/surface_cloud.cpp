@@ -46,8 +46,9 @@ struct Open {
   /// Below this reach, the walls of a hall may be too far to be seen; below this slope, no beam looks above the
   /// horizontal. Then it says nothing that few come back from there.
   static constexpr float kLeastReach_m = 20.f, kLeastSlope = 0.02f;
-  /// What looks up by 24 degrees and more knows a roof. Below that, crowns and houses close a street in as well, but
-  /// one sees on along it: simulated halls (seeds 55 to 57) show 51 m at most, such streets (71, 72, 92, 94) 55 m.
+  /// A sensor that looks up by 24 degrees and more tells a roof from a street. The beams of others meet crowns and
+  /// houses all round in a street, too, but along it they reach farther: 55 m and more (towns 71, 72, 92, 94), in
+  /// simulated halls (seeds 55 to 57) 51 m at most.
   static constexpr float kSteep = 0.45f, kFarthestBelowRoof_m = 53.f;
 };
 

@@ -37,7 +37,7 @@ struct GeometricEvidence {
 
   bool is_consistent() const { return !refusal; }
   /// Whether this one scan is enough to know the place. Of a room it must show more, since scans of another building
-  /// reach log odds of 5, a few of them 8, and of a sector of one still more (docs/maps.md).
+  /// reach log odds of 5, a few of them 8; where only a sector of it is seen, more still (docs/maps.md).
   bool decides_alone() const {
     const double sure = evidence.both_are_narrow ? kSureInSectors_log_odds : kSureInRooms_log_odds;
     return evidence.decides_alone() && (evidence.in_the_open || own_log_odds >= sure);

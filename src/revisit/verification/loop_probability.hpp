@@ -32,7 +32,7 @@ struct LoopEvidence {
 
   /// Where nothing else is known of both scans: a sector of a street may be that of another one.
   bool decides_alone() const { return !one_is_narrow && !(both_are_narrow && in_the_open); }
-  /// Rooms, and sectors of streets, go on for metres as others do.
+  /// Rooms and sectors of streets look like other ones for metres: many scans in a row may fit at a wrong place.
   bool resembles_others() const { return both_are_narrow || !in_the_open; }
 };
 
